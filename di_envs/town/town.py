@@ -1,0 +1,22 @@
+"""A town: its lane network, signals and crosswalks, read once and shared by everybody, read-only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from di_envs.town.lanes import Crosswalks, Lanes, Signals
+
+
+@dataclass(frozen=True, kw_only=True)
+class Town:
+    """What is static. Arrays are read-only; equal `content_hash` means equal content."""
+
+    name: str
+    lanes: Lanes
+    signals: Signals
+    crosswalks: Crosswalks
+    road_names: tuple[str, ...]  # OpenDRIVE road ids, by Lanes.road
+    junction_names: tuple[str, ...]  # OpenDRIVE junction ids, by Lanes.junction
+    geo_origin: tuple[float, float]  # latitude, longitude [deg] of x = y = 0
+    content_hash: str  # of the OpenDRIVE text, the signals and the reader's version
+    opendrive: str  # the OpenDRIVE text

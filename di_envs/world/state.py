@@ -1,0 +1,202 @@
+"""The world's state as a value: one contiguous record a world, with named fields.
+
+Everything that time changes is here, so that to save, hash or branch a world is to copy a row.
+Actors (axis A) have stable ids: the egos first [0, E), then vehicles, then walkers, then props.
+World frame, SI units; stations are along the lane in its direction of travel.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+TICK_S = 0.05  # 20 Hz, as in the CARLA Leaderboard
+PATH_LANES = 6  # lanes ahead that a vehicle has chosen, its own first
+SPEED_HISTORY = 4  # past speeds in an observation, at 0.5 s, 1 s, …
+HISTORY_TICKS = 10  # ticks between two of them
+HISTORY_LENGTH = SPEED_HISTORY * HISTORY_TICKS + 1
+OCCUPIED_LANES = 4  # lanes that a free body (an ego, a walker) may lie on at once
+COLLISION_MEMORY = 8  # remembered collision places
+
+
+class ActorKind(IntEnum):
+    """What an actor is; ABSENT slots hold nobody."""
+
+    ABSENT = 0
+    CAR = 1
+    VAN = 2
+    TRUCK = 3
+    BUS = 4
+    MOTORCYCLE = 5
+    BICYCLE = 6
+    WALKER = 7
+    PROP = 8
+
+
+class EventKind(IntEnum):
+    """What Leaderboard 1.0 counts, and what ends a route."""
+
+    COLLISION_WALKER = 1
+    COLLISION_VEHICLE = 2
+    COLLISION_STATIC = 3
+    RED_LIGHT = 4
+    STOP_SIGN = 5
+    OUTSIDE_LANES = 6  # value: metres outside or against the lane
+    ROUTE_DEVIATION = 7
+    BLOCKED = 8
+    TIMEOUT = 9
+    COMPLETED = 10
+
+
+class State(NamedTuple):
+    """Views into one world's record; see `state_dtype` for shapes and meanings."""
+
+    seed: NDArray[np.uint64]  # ()
+    tick: NDArray[np.int64]  # ()
+    # actors (A,)
+    kind: NDArray[np.int8]  # ActorKind
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]  # of the ground below the actor
+    yaw: NDArray[np.float64]
+    speed: NDArray[np.float64]  # m/s along yaw
+    acceleration: NDArray[np.float64]  # m/s2 along yaw, of the last tick
+    yaw_rate: NDArray[np.float64]  # rad/s
+    half_length: NDArray[np.float64]  # m
+    half_width: NDArray[np.float64]  # m
+    height: NDArray[np.float64]  # m
+    lane: NDArray[np.int32]  # driving lane that the actor is on (nearest one for egos), -1 for none
+    lane_m: NDArray[np.float64]  # station of the actor's centre on it
+    lateral_m: NDArray[np.float64]  # offset from the lane's centre, positive to the right
+    # vehicles (A,), unused by the rest
+    path: NDArray[np.int32]  # (A, PATH_LANES) lanes ahead, own lane first, -1 at the end
+    previous_lane: NDArray[np.int32]  # the lane left last (its tail may still be on it), -1 for none
+    changing_from: NDArray[np.int32]  # lane that a lane change leaves, -1 when none is under way
+    change_start_tick: NDArray[np.int64]
+    grant: NDArray[np.int32]  # junction lane that the vehicle may enter or is on, -1 for none
+    arrival_tick: NDArray[np.int64]  # when it came to the stop line it waits at, -1 for none
+    stopped_at: NDArray[np.int32]  # stop line at which it has stopped for the sign, -1 for none
+    still_ticks: NDArray[np.int32]  # ticks for which it has stood still
+    desired_factor: NDArray[np.float64]  # of the speed limit, per driver
+    brake_light: NDArray[np.int8]
+    indicator: NDArray[np.int8]  # -1 left, 0 off, 1 right
+    # walkers (A,), unused by the rest
+    walk_edge: NDArray[np.int32]  # edge of the walking graph
+    walk_m: NDArray[np.float64]  # station along it
+    walk_direction: NDArray[np.int8]  # 1 along the edge, -1 against
+    walk_waiting: NDArray[np.int8]  # 1 while waiting at a kerb
+    # lights: (J,) junctions, (S,) signal heads
+    phase_group: NDArray[np.int32]  # group whose turn it is
+    phase_ticks: NDArray[np.int32]  # ticks since its green began
+    light: NDArray[np.int8]  # (S,) LightState
+    # egos (E,): controls and progress
+    throttle: NDArray[np.float64]  # held control, 0..1
+    steer: NDArray[np.float64]  # held control, -1..1, positive right
+    brake: NDArray[np.float64]  # held control, 0..1
+    wheel: NDArray[np.float64]  # steering that the actuator has reached, -1..1
+    speed_history: NDArray[np.float64]  # (E, HISTORY_LENGTH) ring of speeds by tick
+    route_index: NDArray[np.int32]  # route point reached
+    route_done_m: NDArray[np.float64]  # metres of the dense route completed
+    target_index: NDArray[np.int32]  # next target point, an index into the plan's targets
+    occupied: NDArray[np.int32]  # (E, OCCUPIED_LANES) driving lanes below the ego's box, -1 for none
+    finished: NDArray[np.int8]  # EventKind that ended the route, 0 while it goes on
+    # egos (E,): what the events remember
+    last_collision_actor: NDArray[np.int32]
+    last_collision_tick: NDArray[np.int64]
+    collision_places: NDArray[np.float64]  # (E, COLLISION_MEMORY, 2), NaN for none
+    last_red_signal: NDArray[np.int32]
+    stop_target: NDArray[np.int32]  # stop sign being watched, -1 for none
+    stop_done: NDArray[np.int8]  # the ego stopped for it
+    stop_affected: NDArray[np.int8]  # the ego was in its box
+    outside_lane: NDArray[np.int8]
+    wrong_lane: NDArray[np.int8]
+    lane_before: NDArray[np.int32]  # lane at the last tick, for the wrong-way test
+    outside_m: NDArray[np.float64]  # route metres outside lanes or against them
+    outside_done_m: NDArray[np.float64]  # route metres at the last look
+    deviation_m: NDArray[np.float64]  # route progress made while more than 15 m off
+    blocked_ticks: NDArray[np.int32]
+    counts: NDArray[np.int32]  # (E, 12) events so far, by EventKind
+
+
+class Capacity(NamedTuple):
+    """How many there can be of each; fixes the layout of the record."""
+
+    egos: int
+    vehicles: int
+    walkers: int
+    props: int
+    junctions: int
+    signals: int
+
+    @property
+    def actors(self) -> int:
+        return self.egos + self.vehicles + self.walkers + self.props
+
+
+_F8, _I8, _I4, _I1, _U8 = "f8", "i8", "i4", "i1", "u8"
+
+
+def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
+    """The record of one world; field order is that of `State`."""
+    actors, egos = (capacity.actors,), (capacity.egos,)
+    shapes: dict[str, tuple[str, tuple[int, ...]]] = {
+        "seed": (_U8, ()),
+        "tick": (_I8, ()),
+        "kind": (_I1, actors),
+        **dict.fromkeys(("x", "y", "z", "yaw", "speed", "acceleration", "yaw_rate"), (_F8, actors)),
+        **dict.fromkeys(("half_length", "half_width", "height"), (_F8, actors)),
+        "lane": (_I4, actors),
+        **dict.fromkeys(("lane_m", "lateral_m"), (_F8, actors)),
+        "path": (_I4, (*actors, PATH_LANES)),
+        **dict.fromkeys(("previous_lane", "changing_from"), (_I4, actors)),
+        "change_start_tick": (_I8, actors),
+        "grant": (_I4, actors),
+        "arrival_tick": (_I8, actors),
+        **dict.fromkeys(("stopped_at", "still_ticks"), (_I4, actors)),
+        "desired_factor": (_F8, actors),
+        **dict.fromkeys(("brake_light", "indicator"), (_I1, actors)),
+        "walk_edge": (_I4, actors),
+        "walk_m": (_F8, actors),
+        **dict.fromkeys(("walk_direction", "walk_waiting"), (_I1, actors)),
+        **dict.fromkeys(("phase_group", "phase_ticks"), (_I4, (capacity.junctions,))),
+        "light": (_I1, (capacity.signals,)),
+        **dict.fromkeys(("throttle", "steer", "brake", "wheel"), (_F8, egos)),
+        "speed_history": (_F8, (*egos, HISTORY_LENGTH)),
+        "route_index": (_I4, egos),
+        "route_done_m": (_F8, egos),
+        "target_index": (_I4, egos),
+        "occupied": (_I4, (*egos, OCCUPIED_LANES)),
+        "finished": (_I1, egos),
+        "last_collision_actor": (_I4, egos),
+        "last_collision_tick": (_I8, egos),
+        "collision_places": (_F8, (*egos, COLLISION_MEMORY, 2)),
+        **dict.fromkeys(("last_red_signal", "stop_target"), (_I4, egos)),
+        **dict.fromkeys(("stop_done", "stop_affected", "outside_lane", "wrong_lane"), (_I1, egos)),
+        "lane_before": (_I4, egos),
+        **dict.fromkeys(("outside_m", "outside_done_m", "deviation_m"), (_F8, egos)),
+        "blocked_ticks": (_I4, egos),
+        "counts": (_I4, (*egos, 12)),
+    }
+    return np.dtype([(name, *shapes[name]) for name in State._fields], align=True)
+
+
+def views_of(record: NDArray[np.void]) -> State:
+    """Named views into a world's record, a one-element array: they share its memory."""
+    return State(*(record[name][0] if record[name].ndim > 1 else record[name].reshape(()) for name in State._fields))
+
+
+class Routes(NamedTuple):
+    """The egos' plans for kernels, one after the other: ego e has points [start[e], start[e + 1])."""
+
+    start: NDArray[np.int32]  # (E + 1,)
+    points: NDArray[np.float64]  # (R, 4) x, y, z, yaw
+    option: NDArray[np.int8]  # (R,) RoadOption
+    lane: NDArray[np.int32]  # (R,)
+    lane_m: NDArray[np.float64]  # (R,)
+    route_m: NDArray[np.float64]  # (R,) from 0 for each ego
+    target_start: NDArray[np.int32]  # (E + 1,)
+    target: NDArray[np.int32]  # (T,) indices of target points, counted within each ego's own route
+    timeout_s: NDArray[np.float64]  # (E,)
