@@ -72,6 +72,7 @@ class Lanes(NamedTuple):
     # (P, 4) x, y, z, yaw; yaw is continuous along a lane (not wrapped)
     points: Float64
     width_m: Float64  # (P,)
+    road_m: Float64  # (P,) station of the point along its road's reference line (OpenDRIVE's s)
     change: Int8  # (P,) bit 1: a change to the left is allowed here, bit 2: to the right
     # spatial index: points sorted by grid cell; cell (i, j) holds
     # cell_point[cell_start[j * columns + i] : cell_start[j * columns + i + 1]]
