@@ -115,7 +115,9 @@ class State(NamedTuple):
     wrong_lane: NDArray[np.int8]
     lane_before: NDArray[np.int32]  # lane at the last tick, for the wrong-way test
     outside_m: NDArray[np.float64]  # route metres outside lanes or against them
-    outside_done_m: NDArray[np.float64]  # route metres at the last look
+    outside_done_m: NDArray[np.float64]  # route metres over which they were counted
+    outside_index: NDArray[np.int32]  # route point up to which they were counted
+    deviation_index: NDArray[np.int32]  # route point that the deviation test follows
     deviation_m: NDArray[np.float64]  # route progress made while more than 15 m off
     blocked_ticks: NDArray[np.int32]
     counts: NDArray[np.int32]  # (E, 12) events so far, by EventKind
@@ -176,7 +178,9 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         **dict.fromkeys(("last_red_signal", "stop_target"), (_I4, egos)),
         **dict.fromkeys(("stop_done", "stop_affected", "outside_lane", "wrong_lane"), (_I1, egos)),
         "lane_before": (_I4, egos),
-        **dict.fromkeys(("outside_m", "outside_done_m", "deviation_m"), (_F8, egos)),
+        **dict.fromkeys(("outside_m", "outside_done_m"), (_F8, egos)),
+        **dict.fromkeys(("outside_index", "deviation_index"), (_I4, egos)),
+        "deviation_m": (_F8, egos),
         "blocked_ticks": (_I4, egos),
         "counts": (_I4, (*egos, 12)),
     }
