@@ -114,6 +114,7 @@ class State(NamedTuple):
     outside_lane: NDArray[np.int8]
     wrong_lane: NDArray[np.int8]
     lane_before: NDArray[np.int32]  # lane at the last tick, for the wrong-way test
+    lane_before_yaw: NDArray[np.float64]  # that lane's direction where the ego was
     outside_m: NDArray[np.float64]  # route metres outside lanes or against them
     outside_done_m: NDArray[np.float64]  # route metres over which they were counted
     outside_index: NDArray[np.int32]  # route point up to which they were counted
@@ -178,6 +179,7 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         **dict.fromkeys(("last_red_signal", "stop_target"), (_I4, egos)),
         **dict.fromkeys(("stop_done", "stop_affected", "outside_lane", "wrong_lane"), (_I1, egos)),
         "lane_before": (_I4, egos),
+        "lane_before_yaw": (_F8, egos),
         **dict.fromkeys(("outside_m", "outside_done_m"), (_F8, egos)),
         **dict.fromkeys(("outside_index", "deviation_index"), (_I4, egos)),
         "deviation_m": (_F8, egos),
