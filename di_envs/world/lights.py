@@ -1,0 +1,69 @@
+# mypy: disallow_untyped_defs=False
+"""Traffic lights: the arms of a junction take turns, one group at a time, the rest stay red.
+
+Source: CARLA's rule as its maintainers describe it (carla issues 7684 and 7738), with the times of
+the example there: green 10 s, yellow 3 s, red 2 s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from di_envs.kernels import kernel
+from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.town.lanes import LightState, SignalKind
+from di_envs.world.state import TICK_S
+
+GREEN_TICKS = round(10.0 / TICK_S)
+YELLOW_TICKS = round(3.0 / TICK_S)
+RED_TICKS = round(2.0 / TICK_S)
+TURN_TICKS = GREEN_TICKS + YELLOW_TICKS + RED_TICKS
+
+_LIGHT = int(SignalKind.LIGHT)
+_NONE, _GREEN, _YELLOW, _RED = (int(state) for state in LightState)
+_PHASE_STREAM = int(Stream.LIGHT_PHASE)
+
+
+@kernel
+def start_lights(state, signals):
+    """Draws whose turn it is at each junction, and for how long it has been, from the seed."""
+    for junction in range(signals.groups.size):
+        groups = signals.groups[junction]
+        if groups > 0:
+            draw = keyed_hash(state.seed[()], _PHASE_STREAM, 0, junction)
+            state.phase_group[junction] = np.int32(draw % np.uint64(groups))
+            state.phase_ticks[junction] = np.int32((draw >> np.uint64(20)) % np.uint64(TURN_TICKS))
+    show_lights(state, signals)
+
+
+@kernel
+def advance_lights(state, signals):
+    """One tick: turns end, the next group's begins, every head shows its colour."""
+    for junction in range(signals.groups.size):
+        if signals.groups[junction] > 0:
+            state.phase_ticks[junction] += 1
+            if state.phase_ticks[junction] >= TURN_TICKS:
+                state.phase_ticks[junction] = 0
+                state.phase_group[junction] = (
+                    state.phase_group[junction] + 1
+                ) % signals.groups[junction]
+    show_lights(state, signals)
+
+
+@kernel
+def show_lights(state, signals):
+    """Sets each head's colour from its junction's phase."""
+    for signal in range(signals.kind.size):
+        if signals.kind[signal] != _LIGHT:
+            state.light[signal] = _NONE
+            continue
+        junction = signals.junction[signal]
+        ticks = state.phase_ticks[junction]
+        if state.phase_group[junction] != signals.group[signal] or ticks >= (
+            GREEN_TICKS + YELLOW_TICKS
+        ):
+            state.light[signal] = _RED
+        elif ticks >= GREEN_TICKS:
+            state.light[signal] = _YELLOW
+        else:
+            state.light[signal] = _GREEN
