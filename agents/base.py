@@ -35,9 +35,15 @@ class Requirements:
     control_dt_s: float = 0.1
     privileged: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)  # further environment options
+    branchable: bool = True  # False for an agent that hides memory outside its `Memory`
+
+    def __post_init__(self) -> None:
+        if not self.control_dt_s > 0.0:
+            raise ValueError(f"control_dt_s must be positive, not {self.control_dt_s}")
 
     @property
     def track(self) -> Track:
+        """The track that these needs put an agent in."""
         if self.privileged:
             return Track.PRIVILEGED
         if {"camera", "lidar"} & set(self.observations):
@@ -48,17 +54,51 @@ class Requirements:
 class Agent(Protocol[Memory]):
     """Chooses controls from what it `requires`, and from nothing else.
 
-    All memory is a value, passed in and out, so that an episode can be branched with its agent.
+    All memory is a value, passed in and out, so that an episode can be branched with its agent:
+    `act` changes neither the memory nor the observation that it is given.
     A privileged agent's observation holds a read-only `WorldView` under the key `world`.
     """
 
     requires: Requirements
 
-    def start(self, plan: RoutePlan, seed: int) -> Memory: ...
+    def start(self, plan: RoutePlan, seed: int) -> Memory:
+        """The memory with which an episode along `plan` begins."""
+        ...
 
-    def act(self, observation: Observation, memory: Memory) -> tuple[Control, Memory]: ...
+    def act(self, observation: Observation, memory: Memory) -> tuple[Control, Memory]:
+        """The control to hold for `requires.control_dt_s`, and the memory for the next call."""
+        ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Frees what the agent holds."""
+        ...
 
 
-__all__ = ["Agent", "Control", "Memory", "Observation", "Requirements", "Track", "WorldView"]
+def make_control(throttle: float, steer: float, brake: float) -> Control:
+    """A control, clipped to its range.
+
+    Raises:
+        ValueError: If a number is NaN: clipping would hide a driver's mistake.
+    """
+    if throttle != throttle or steer != steer or brake != brake:
+        raise ValueError(f"control has NaN: throttle {throttle}, steer {steer}, brake {brake}")
+    return np.array(
+        [
+            min(max(throttle, 0.0), 1.0),
+            min(max(steer, -1.0), 1.0),
+            min(max(brake, 0.0), 1.0),
+        ],
+        dtype=np.float32,
+    )
+
+
+__all__ = [
+    "Agent",
+    "Control",
+    "Memory",
+    "Observation",
+    "Requirements",
+    "Track",
+    "WorldView",
+    "make_control",
+]

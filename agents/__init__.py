@@ -1,0 +1,154 @@
+"""Drivers, by name: one literal table, and `load_agent`, which reads a name or a place in code.
+
+This module imports no driver and no kernel, so that `import agents` stays light.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from agents.base import Agent
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentEntry:
+    """A line of the table of agents."""
+
+    entry_point: str  # module:Class
+    summary: str
+    options: Mapping[str, Any] = field(default_factory=dict)  # keyword arguments of the class
+
+
+AGENTS: dict[str, AgentEntry] = {
+    "expert": AgentEntry(
+        entry_point="agents.expert:Expert",
+        summary="rules over the true state: follows, predicts, yields, obeys lights and signs",
+    ),
+    "expert-blind": AgentEntry(
+        entry_point="agents.expert:Expert",
+        summary="the expert that ignores all other actors (a control for traffic's politeness)",
+        options={"ignore_actors": True},
+    ),
+    "expert-redrunner": AgentEntry(
+        entry_point="agents.expert:Expert",
+        summary="the expert that ignores traffic lights (a control for the red-light rule)",
+        options={"ignore_lights": True},
+    ),
+    "highway": AgentEntry(
+        entry_point="agents.highway:HighwayAgent",
+        summary="highway-env's own IDM, MOBIL and steering controllers; knows no lights or signs",
+    ),
+    "constant": AgentEntry(
+        entry_point="agents.constant:ConstantAgent",
+        summary="the same control for ever",
+    ),
+    "random": AgentEntry(
+        entry_point="agents.random:RandomAgent",
+        summary="keyed uniform controls, each held for a second",
+    ),
+}
+
+_CONTRACT = ("requires", "start", "act", "close")
+
+
+class AgentSpecError(ValueError):
+    """An agent specification that names nothing, or something that is no agent."""
+
+
+def load_agent(spec: str, **options: Any) -> Agent[Any]:
+    """Makes the agent that `spec` names.
+
+    Args:
+        spec: A name of `AGENTS`, or `module:Class`, or `path/to/file.py:Class`.
+        options: Keyword arguments of the agent's class; they override the table's.
+
+    Raises:
+        AgentSpecError: If the name, module, file or class is unknown, or the class is no agent.
+    """
+    entry = AGENTS.get(spec)
+    if entry is not None:
+        return _make(spec, entry.entry_point, {**entry.options, **options})
+    if ":" not in spec:
+        raise AgentSpecError(_unknown_name(spec))
+    return _make(spec, spec, options)
+
+
+def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]:
+    place, _, class_name = entry_point.rpartition(":")
+    module = _module_of(spec, place)
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        known = [name for name, value in vars(module).items() if _defined_in(module, value)]
+        raise AgentSpecError(
+            f"agent '{spec}': {place} has no class '{class_name}'; {_hint(class_name, known)}"
+        )
+    agent: Agent[Any] = found(**options)
+    missing = [name for name in _CONTRACT if not hasattr(agent, name)]
+    if missing:
+        raise AgentSpecError(
+            f"agent '{spec}': {class_name} lacks {', '.join(missing)}; an agent has "
+            f"{', '.join(_CONTRACT)} (see agents/base.py)."
+        )
+    return agent
+
+
+def _module_of(spec: str, place: str) -> ModuleType:
+    if place.endswith(".py"):
+        return _module_of_file(spec, Path(place))
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        if error.name is None or not (place + ".").startswith(error.name + "."):
+            raise  # the module is there, something that it imports is not
+        raise AgentSpecError(
+            f"agent '{spec}': no module '{error.name}'; expected a name, module:Class or "
+            f"path/to/file.py:Class. {_unknown_name(place)}"
+        ) from None
+
+
+def _module_of_file(spec: str, path: Path) -> ModuleType:
+    if not path.is_file():
+        raise AgentSpecError(f"agent '{spec}': there is no file {path.absolute()}.")
+    path = path.resolve()
+    # Named after the path, so that two files of the same name do not replace each other.
+    name = f"agent_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    module_spec = importlib.util.spec_from_file_location(name, path)
+    if module_spec is None or module_spec.loader is None:
+        raise AgentSpecError(f"agent '{spec}': {path} cannot be imported as a Python module.")
+    module = importlib.util.module_from_spec(module_spec)
+    sys.modules[name] = module
+    try:
+        module_spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _defined_in(module: ModuleType, value: object) -> bool:
+    return isinstance(value, type) and value.__module__ == module.__name__
+
+
+def _unknown_name(name: str) -> str:
+    return f"unknown agent '{name}'; {_hint(name, list(AGENTS))}"
+
+
+def _hint(name: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
+    start = f"did you mean '{near[0]}'? " if near else ""
+    return f"{start}known: {', '.join(known) or 'none'}."
+
+
+__all__ = ["AGENTS", "AgentEntry", "AgentSpecError", "load_agent"]
