@@ -1,0 +1,65 @@
+# mypy: disallow_untyped_defs=False
+"""All events of CARLA Leaderboard 1.0 for one ego and tick, each by the rule of its own module.
+
+Source: CARLA leaderboard and scenario_runner, branches `leaderboard-1.0`, of which the geometry,
+thresholds and de-duplication are kept, traps included. Collisions are recorded where they happen,
+in `contact.resolve_contacts`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from di_envs.kernels import kernel
+from di_envs.world.lane_keeping import watch_lanes
+from di_envs.world.red_light import detect_red_light
+from di_envs.world.route_end import detect_route_end
+from di_envs.world.stop_sign import detect_stop_sign
+
+
+@kernel
+def begin_events(state, ego):
+    """Clears what the events remember of an ego, at the start of its route."""
+    state.last_collision_actor[ego] = -1
+    state.last_collision_tick[ego] = 0
+    state.collision_places[ego, :, :] = math.nan
+    state.last_red_signal[ego] = -1
+    state.stop_target[ego] = -1
+    state.stop_done[ego] = 0
+    state.stop_affected[ego] = 0
+    state.outside_lane[ego] = 0
+    state.wrong_lane[ego] = 0
+    state.lane_before[ego] = -1
+    state.lane_before_yaw[ego] = 0.0
+    state.outside_m[ego] = 0.0
+    state.outside_done_m[ego] = 0.0
+    state.outside_index[ego] = 0
+    state.deviation_index[ego] = 0
+    state.deviation_m[ego] = 0.0
+    state.blocked_ticks[ego] = 0
+    state.finished[ego] = 0
+    state.counts[ego, :] = 0
+
+
+@kernel
+def detect_events(state, lanes, signals, routes, ego, out, n):
+    """Looks for every event but collisions, after `locate_ego` and `advance_progress`.
+
+    Args:
+        state: The world; the ego's event memory, `counts` and `finished` change.
+        lanes: The town's lanes.
+        signals: The town's signals.
+        routes: The egos' routes.
+        ego: The ego's actor index.
+        out: (N, 8) event rows: kind, ego, tick, x, y, z, other, value.
+        n: Rows in use.
+
+    Returns:
+        The number of rows in use. Nothing is detected once the route has ended.
+    """
+    if state.finished[ego] != 0:
+        return n
+    watch_lanes(state, lanes, routes, ego)
+    n = detect_red_light(state, lanes, signals, ego, out, n)
+    n = detect_stop_sign(state, lanes, signals, ego, out, n)
+    return detect_route_end(state, routes, ego, out, n)
