@@ -1,0 +1,53 @@
+"""DriveInsight's environments: importing this registers their Gymnasium ids, and stays light.
+
+`gym.make("DriveInsight-Town05Long-v0")` works after `import di_envs`; without it,
+`gym.make("di_envs:DriveInsight-Town05Long-v0")`. Numba and the towns are loaded by the first
+environment that is made.
+"""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from di_envs.config import RouteEnvConfig
+from di_envs.saving import EnvSnapshot, restore, save
+from di_envs.shadowing import check_not_shadowed
+
+# One literal table; a change that can move a score needs a new version number.
+ENVIRONMENTS = {
+    "DriveInsight-Town05Long-v0": RouteEnvConfig(suite="town05_long"),
+    "DriveInsight-Town05Short-v0": RouteEnvConfig(suite="town05_short"),
+    "DriveInsight-Town05Tiny-v0": RouteEnvConfig(suite="town05_tiny"),
+    "DriveInsight-Toy-v0": RouteEnvConfig(suite="toy"),
+}
+
+# Loaded when first asked for, as they bring Numba with them.
+_LAZY = {"RouteEnv": "di_envs.route_env"}
+
+__all__ = ["ENVIRONMENTS", "EnvSnapshot", "RouteEnv", "RouteEnvConfig", "restore", "save"]
+
+
+def _register() -> None:
+    for env_id, config in ENVIRONMENTS.items():
+        if env_id not in gymnasium.registry:
+            gymnasium.register(
+                env_id, entry_point="di_envs.route_env:RouteEnv", kwargs=config.changes()
+            )
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(importlib.import_module(_LAZY[name]), name)
+    raise AttributeError(f"module 'di_envs' has no attribute {name!r}; it has {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})
+
+
+check_not_shadowed(Path(__file__).resolve().parent.parent)
+_register()

@@ -1,0 +1,161 @@
+"""What a `RouteEnv` can be told: every option, its default, and which values are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from di_envs.world.state import TICK_S, EventKind
+
+OBSERVATION_GROUPS = ("prompt", "inertial")  # what can be asked for now
+LATER_GROUPS = ("camera", "lidar")  # named in the design, not rendered yet
+EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
+RULES = ("carla-1.0",)
+
+# Names of CARLA's presets (carla.WeatherParameters), the fourteen of the Leaderboard first.
+WEATHERS = (
+    "ClearNoon",
+    "ClearSunset",
+    "CloudyNoon",
+    "CloudySunset",
+    "WetNoon",
+    "WetSunset",
+    "MidRainyNoon",
+    "MidRainSunset",
+    "WetCloudyNoon",
+    "WetCloudySunset",
+    "HardRainNoon",
+    "HardRainSunset",
+    "SoftRainNoon",
+    "SoftRainSunset",
+    "ClearNight",
+    "CloudyNight",
+    "WetNight",
+    "WetCloudyNight",
+    "SoftRainNight",
+    "MidRainyNight",
+    "HardRainNight",
+    "DustStorm",
+    "Default",
+)
+
+
+def check_name(name: str, known: Iterable[str], what: str) -> None:
+    """Refuses a name that is not known.
+
+    Raises:
+        ValueError: If it is not among `known`; suggests the nearest, and lists all.
+    """
+    names = list(known)
+    if name not in names:
+        near = difflib.get_close_matches(str(name), names, n=1)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        raise ValueError(f"Unknown {what} {name!r}; {hint}known: {', '.join(names)}.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteEnvConfig:
+    """Options of a `RouteEnv`. None stands for what the suite says.
+
+    Either `suite` names a shipped suite, or `town` and `routes` name the user's own files; given
+    together, the files replace the suite's town or routes and the suite gives the rest.
+
+    Attributes:
+        suite: Name of a shipped suite, such as `town05_long`.
+        town: Name of a shipped town, or path of an OpenDRIVE file.
+        routes: Path of a route file in CARLA's XML.
+        route_ids: Ids of the routes to use; None for all.
+        signals: Sidecar file or shipped name of a town's signals, or `synthesise`.
+        observations: Groups of observations: `prompt`, `inertial` (`camera`, `lidar` come later).
+        traffic: Number of other vehicles.
+        walkers: Number of walkers.
+        weather: Name of one of CARLA's weather presets; seen by cameras only.
+        control_dt_s: Time for which an action is held, a multiple of the world tick of 0.05 s.
+        rules: Name of the scoring rules; their penalties make the reward.
+        terminate_on: Events that end the episode besides those by which the rules do, such as
+            `collision_vehicle`.
+    """
+
+    suite: str | None = None
+    town: str | None = None
+    routes: str | None = None
+    route_ids: tuple[str, ...] | None = None
+    signals: str | None = None
+    observations: tuple[str, ...] = ("prompt", "inertial")
+    traffic: int | None = None
+    walkers: int | None = None
+    weather: str | None = None
+    control_dt_s: float = 0.1
+    rules: str = "carla-1.0"
+    terminate_on: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._freeze_names()
+        if self.suite is None and self.routes is None:
+            raise ValueError(
+                "A RouteEnv needs routes: give suite=NAME, or town=FILE and routes=FILE."
+            )
+        self._check_names()
+        for field in ("traffic", "walkers"):
+            count = getattr(self, field)
+            if count is not None and (isinstance(count, bool) or int(count) != count or count < 0):
+                raise ValueError(f"{field} is a number of actors, 0 or more; got {count!r}.")
+        ticks = self.control_dt_s / TICK_S
+        if not (ticks >= 0.999 and abs(ticks - round(ticks)) < 1e-6):
+            raise ValueError(
+                f"control_dt_s must be a positive multiple of the world tick of {TICK_S} s, such "
+                f"as 0.05, 0.1 or 0.5; got {self.control_dt_s!r}."
+            )
+
+    def _freeze_names(self) -> None:
+        """Makes tuples of lists (JSON has no tuples); a lone string is refused, not spelled out."""
+        for field in ("route_ids", "observations", "terminate_on"):
+            value = getattr(self, field)
+            if isinstance(value, str):
+                raise ValueError(f"{field} is a tuple of names; got a string. Try ({value!r},).")
+            if value is not None:
+                object.__setattr__(self, field, tuple(str(name) for name in value))
+
+    def _check_names(self) -> None:
+        if not self.observations:
+            raise ValueError(f"observations is empty; known: {', '.join(OBSERVATION_GROUPS)}.")
+        for group in self.observations:
+            if group in LATER_GROUPS:
+                raise ValueError(
+                    f"Observation group '{group}' is not available yet; available: "
+                    f"{', '.join(OBSERVATION_GROUPS)}."
+                )
+            check_name(group, OBSERVATION_GROUPS, "observation group")
+        for event in self.terminate_on:
+            check_name(event, EVENT_NAMES, "event in terminate_on")
+        if self.weather is not None:
+            check_name(self.weather, WEATHERS, "weather")
+        check_name(self.rules, RULES, "rules")
+
+    @property
+    def control_ticks(self) -> int:
+        """World ticks for which an action is held."""
+        return round(self.control_dt_s / TICK_S)
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """A config of named options.
+
+        Raises:
+            ValueError: If an option is not known (with a suggestion), or a value is refused.
+        """
+        known = [field.name for field in dataclasses.fields(cls)]
+        for option in values:
+            check_name(option, known, "RouteEnv option")
+        return cls(**values)
+
+    def changes(self) -> dict[str, Any]:
+        """The options that differ from their defaults, as keyword arguments."""
+        return {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)
+            if getattr(self, field.name) != field.default
+        }

@@ -1,0 +1,1 @@
+"""Sensors: pure functions of the world's state."""
