@@ -13,6 +13,7 @@ from di_envs.world.occupancy import (
     NO_LEADER_M,
     body_ahead,
     body_behind,
+    find_leader,
     insert_body,
 )
 from di_envs.world.state import TICK_S, ActorKind
@@ -33,13 +34,14 @@ MIN_SPEED_MPS = 1.0
 MIN_GAP_M = 2.0
 ROOM_TIME_S = 4.5  # a change must end before its lane does
 ROOM_M = 25.0
+LOOK_M = 100.0
 
 _ABSENT = int(ActorKind.ABSENT)
 _CHANGE_LEFT, _CHANGE_RIGHT = 1, 2
 
 
 @kernel
-def change_lanes(leaders, occupancy, state, lanes, tables, egos, vehicle_end):
+def change_lanes(occupancy, state, lanes, tables, egos, vehicle_end):
     """Lets each vehicle, once a second, begin a lane change that MOBIL recommends."""
     for actor in range(egos, vehicle_end):
         if (state.tick[()] + actor) % DELAY_TICKS != 0 or state.kind[actor] == _ABSENT:
@@ -56,13 +58,13 @@ def change_lanes(leaders, occupancy, state, lanes, tables, egos, vehicle_end):
             target = lanes.left[lane] if side == 0 else lanes.right[lane]
             bit = _CHANGE_LEFT if side == 0 else _CHANGE_RIGHT
             if target >= 0 and permitted & bit and tables.usable[target]:
-                if _mobil(leaders, occupancy, state, lanes, tables, actor, target):
+                if _mobil(occupancy, state, lanes, tables, actor, target):
                     _begin_change(occupancy, state, lanes, tables, actor, target)
                     break
 
 
 @kernel
-def _mobil(leaders, occupancy, state, lanes, tables, actor, target):
+def _mobil(occupancy, state, lanes, tables, actor, target):
     """Whether a change gains enough and is safe for the new follower and for the vehicle itself."""
     speed = state.speed[actor]
     half = state.half_length[actor]
@@ -82,7 +84,11 @@ def _mobil(leaders, occupancy, state, lanes, tables, actor, target):
         return False
     if not _follower_is_safe(occupancy, state, lanes, actor, target, s):
         return False
-    present = idm_acceleration(speed, desired, leaders.gap_m[actor], leaders.speed[actor])
+    here = state.lane_m[actor]
+    gap, ahead_speed, _ = find_leader(
+        occupancy, lanes, tables, state.path[actor], actor, here, here + half, LOOK_M
+    )
+    present = idm_acceleration(speed, desired, gap, ahead_speed)
     present = max(present, -ACCELERATION_MPS2)
     return min(gained, ACCELERATION_MPS2) - present >= MIN_GAIN_MPS2
 

@@ -353,3 +353,17 @@ def _release_grant(state, lanes, actor):
         state.grant[actor] = -1
         state.stopped_at[actor] = -1
         state.arrival_tick[actor] = -1
+
+
+@kernel
+def note_ego_arrival(state, lanes, ego):
+    """Remembers since when an ego has stood first at a stop line, as it does for vehicles."""
+    lane = state.lane[ego]
+    if lane < 0 or lanes.junction[lane] >= 0:
+        state.arrival_tick[ego] = -1
+        return
+    front = lanes.length_m[lane] - state.lane_m[ego] - state.half_length[ego]
+    if front > 2.0 * STOP_ZONE_M:
+        state.arrival_tick[ego] = -1
+    elif state.arrival_tick[ego] < 0 and state.speed[ego] < MOVING_MPS:
+        state.arrival_tick[ego] = state.tick[()]

@@ -4,13 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
-from di_envs.world.state import Capacity, EventKind, State
+from di_envs.world.dynamics import EgoModel, locate_ego
+from di_envs.world.event_rows import COLUMNS, ROWS_PER_EGO
+from di_envs.world.events import begin_events
+from di_envs.world.lights import start_lights
+from di_envs.world.occupancy import make_occupancy
+from di_envs.world.right_of_way import make_requests
+from di_envs.world.spawn import spawn_traffic
+from di_envs.world.state import (
+    ActorKind,
+    Capacity,
+    EventKind,
+    Routes,
+    State,
+    state_dtype,
+    views_of,
+)
+from di_envs.world.step import Scenery, Scratch, advance
+from di_envs.world.traffic import make_leaders
+from di_envs.world.traffic_tables import traffic_tables
+from di_envs.world.walk_graph import build_walk_graph
+from di_envs.world.walkers import spawn_walkers
+
+STATE_VERSION = "1"  # of the record's layout and meaning; a snapshot of another is refused
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +43,11 @@ class WorldConfig:
     vehicles: int = 120
     walkers: int = 60
     props: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("vehicles", "walkers", "props"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,18 +87,190 @@ class Snapshot:
 
 
 class World:
-    """One world. `view` is stable: it always shows the present state."""
+    """One world. `view` always shows the present state; `reset` and `restore` make a new one."""
 
-    view: WorldView
+    def __init__(self, town: Town, config: WorldConfig | None = None) -> None:
+        self.town = town
+        self.config = config or WorldConfig()
+        self._tables = traffic_tables(town)
+        self._walk = build_walk_graph(town)
+        self._ego_model = EgoModel().parameters()
+        self._view: WorldView | None = None
 
-    def __init__(self, town: Town, config: WorldConfig) -> None: ...
+    @property
+    def view(self) -> WorldView:
+        """The present state, read-only.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        if self._view is None:
+            raise RuntimeError("the world holds no episode yet; call reset(seed, plans) first")
+        return self._view
 
     def reset(self, seed: int, plans: Sequence[RoutePlan]) -> None:
-        """Starts an episode: egos at their routes' starts, traffic and walkers spawned by `seed`."""
+        """Starts an episode: egos at their routes' starts, traffic and walkers drawn from `seed`.
+
+        Args:
+            seed: 0 to 2**64 - 1; equal seeds give equal episodes, bit for bit.
+            plans: One route an ego; none for a world of traffic alone.
+
+        Raises:
+            ValueError: If the town has too few places for the traffic.
+        """
+        self._allocate(tuple(plans))
+        state = self._state
+        state.seed[...] = seed
+        for name in ("lane", "path", "previous_lane", "changing_from", "grant", "stopped_at"):
+            getattr(state, name)[...] = -1
+        for name in ("arrival_tick", "walk_edge", "occupied"):
+            getattr(state, name)[...] = -1
+        start_lights(state, self.town.signals)
+        for ego, plan in enumerate(plans):
+            self._place_ego(ego, plan)
+        first_vehicle, first_walker = len(plans), len(plans) + self.config.vehicles
+        spawn_traffic(
+            state,
+            self.town.lanes,
+            self._tables,
+            tuple(plans),
+            first_vehicle,
+            self.config.vehicles,
+        )
+        spawn_walkers(state, self._walk, first_walker, self.config.walkers)
 
     def advance(self, controls: NDArray[np.float64], ticks: int = 1) -> list[Event]:
-        """Holds (E, 3) throttle, steer, brake for `ticks` ticks and returns what happened."""
+        """Holds the egos' controls for some ticks and returns what happened.
 
-    def save(self) -> Snapshot: ...
+        Args:
+            controls: (E, 3) throttle 0..1, steer -1..1 (positive right), brake 0..1.
+            ticks: How many ticks of TICK_S.
+        """
+        state = self._state
+        state.throttle[:] = controls[:, 0]
+        state.steer[:] = controls[:, 1]
+        state.brake[:] = controls[:, 2]
+        events: list[Event] = []
+        while ticks > 0:
+            batch = min(ticks, self._batch)
+            rows = advance(
+                state, self._scenery, self._scratch, self._vehicle_end, batch, self._event_rows
+            )
+            events += [_event(row) for row in self._event_rows[:rows]]
+            ticks -= batch
+        return events
 
-    def restore(self, snapshot: Snapshot) -> None: ...
+    def save(self) -> Snapshot:
+        """Copies the state whole."""
+        view = self.view
+        return Snapshot(
+            town_hash=self.town.content_hash,
+            version=STATE_VERSION,
+            capacity=view.capacity,
+            record=self._record.copy(),
+            plans=view.plans,
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Puts a saved state back, with its routes.
+
+        Raises:
+            ValueError: If it was saved in another town, or with another layout.
+        """
+        if snapshot.town_hash != self.town.content_hash:
+            raise ValueError(
+                f"the snapshot was saved in a town with hash {snapshot.town_hash}, this one has "
+                f"{self.town.content_hash}; load the town that it was saved in"
+            )
+        capacity = self._capacity(len(snapshot.plans))
+        if (snapshot.version, snapshot.capacity) != (STATE_VERSION, capacity):
+            raise ValueError(
+                f"the snapshot has layout {snapshot.version} {snapshot.capacity}, this world has "
+                f"{STATE_VERSION} {capacity}; make the world with the same numbers of actors"
+            )
+        self._allocate(snapshot.plans)
+        self._record[...] = snapshot.record
+
+    def _capacity(self, egos: int) -> Capacity:
+        return Capacity(
+            egos=egos,
+            vehicles=self.config.vehicles,
+            walkers=self.config.walkers,
+            props=self.config.props,
+            junctions=self.town.signals.groups.size,
+            signals=self.town.signals.kind.size,
+        )
+
+    def _allocate(self, plans: tuple[RoutePlan, ...]) -> None:
+        """Makes a fresh record and the kernels' arguments for these plans."""
+        capacity = self._capacity(len(plans))
+        actors = capacity.actors
+        self._record = np.zeros(1, state_dtype(capacity))
+        self._state = views_of(self._record)
+        self._vehicle_end = capacity.egos + capacity.vehicles
+        self._scenery = Scenery(
+            lanes=self.town.lanes,
+            signals=self.town.signals,
+            crosswalks=self.town.crosswalks,
+            tables=self._tables,
+            walk=self._walk,
+            routes=route_arrays(plans),
+            ego_model=self._ego_model,
+        )
+        self._scratch = Scratch(
+            occupancy=make_occupancy(self.town.lanes.kind.size, actors, capacity.egos),
+            requests=make_requests(actors),
+            leaders=make_leaders(actors),
+            busy=np.zeros(self.town.crosswalks.width_m.size, np.int8),
+            acceleration=np.zeros(actors),
+            cap=np.zeros(actors),
+        )
+        self._batch = 100
+        self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * self._batch, COLUMNS))
+        read_only = views_of(self._record)
+        for array in read_only:
+            array.flags.writeable = False
+        self._view = WorldView(town=self.town, state=read_only, plans=plans, capacity=capacity)
+
+    def _place_ego(self, ego: int, plan: RoutePlan) -> None:
+        state, model = self._state, EgoModel()
+        state.kind[ego] = ActorKind.CAR
+        state.half_length[ego] = model.half_length_m
+        state.half_width[ego] = model.half_width_m
+        state.height[ego] = model.height_m
+        state.x[ego], state.y[ego], state.z[ego], state.yaw[ego] = plan.points[0]
+        begin_events(state, ego)
+        locate_ego(state, self.town.lanes, ego)
+
+
+def route_arrays(plans: Sequence[RoutePlan]) -> Routes:
+    """The plans one after the other, as kernels read them."""
+
+    def join(parts: list[NDArray[Any]], empty: tuple[int, ...], dtype: str) -> NDArray[Any]:
+        return np.concatenate([np.zeros(empty), *parts]).astype(dtype)
+
+    return Routes(
+        start=np.cumsum([0] + [plan.points.shape[0] for plan in plans]).astype(np.int32),
+        points=join([plan.points for plan in plans], (0, 4), "f8"),
+        option=join([plan.option for plan in plans], (0,), "i1"),
+        lane=join([plan.lane for plan in plans], (0,), "i4"),
+        lane_m=join([plan.lane_m for plan in plans], (0,), "f8"),
+        route_m=join([plan.route_m for plan in plans], (0,), "f8"),
+        target_start=np.cumsum([0] + [plan.targets.size for plan in plans]).astype(np.int32),
+        target=join([plan.targets for plan in plans], (0,), "i4"),
+        timeout_s=np.array([plan.timeout_s for plan in plans], "f8"),
+    )
+
+
+def _event(row: NDArray[np.float64]) -> Event:
+    kind, ego, tick, x, y, z, other, value = row.tolist()
+    return Event(
+        kind=EventKind(int(kind)),
+        ego=int(ego),
+        tick=int(tick),
+        x=x,
+        y=y,
+        z=z,
+        other=int(other),
+        value=value,
+    )

@@ -1,0 +1,107 @@
+# mypy: disallow_untyped_defs=False
+"""One tick of a world: the order in which everything moves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.kernels import kernel
+from di_envs.town.lanes import Crosswalks, Lanes, Signals
+from di_envs.world.contact import resolve_contacts
+from di_envs.world.dynamics import EgoParameters, locate_ego, move_ego
+from di_envs.world.events import detect_events
+from di_envs.world.lane_change import change_lanes
+from di_envs.world.lights import advance_lights
+from di_envs.world.occupancy import Occupancy, fill_occupancy
+from di_envs.world.progress import advance_progress
+from di_envs.world.right_of_way import Requests, note_ego_arrival, update_grants
+from di_envs.world.state import ActorKind, Routes
+from di_envs.world.traffic import Leaders, choose_speed, find_leaders, move_vehicle
+from di_envs.world.traffic_tables import TrafficTables
+from di_envs.world.walk_graph import WalkGraph
+from di_envs.world.walkers import mark_busy_crosswalks, move_walkers
+
+_ABSENT = int(ActorKind.ABSENT)
+
+
+class Scenery(NamedTuple):
+    """What does not change in an episode."""
+
+    lanes: Lanes
+    signals: Signals
+    crosswalks: Crosswalks
+    tables: TrafficTables
+    walk: WalkGraph
+    routes: Routes
+    ego_model: EgoParameters
+
+
+class Scratch(NamedTuple):
+    """Working memory of a tick: nothing in it outlives the tick."""
+
+    occupancy: Occupancy
+    requests: Requests
+    leaders: Leaders
+    busy: NDArray[np.int8]  # (X,) crosswalks that somebody walks on
+    acceleration: NDArray[np.float64]  # (A,)
+    cap: NDArray[np.float64]  # (A,)
+
+
+@kernel
+def advance(state, scenery, scratch, vehicle_end, ticks, out):
+    """Moves a world on by `ticks` ticks; the egos' controls are held in the state.
+
+    Args:
+        state: The world, changed in place.
+        scenery: What it stands on.
+        scratch: Working memory.
+        vehicle_end: First actor id behind the vehicles.
+        ticks: How many ticks.
+        out: (N, 8) rows for events, see `event_rows`.
+
+    Returns:
+        The number of event rows written.
+    """
+    egos = state.throttle.size
+    n = 0
+    for _ in range(ticks):
+        state.tick[()] += 1
+        advance_lights(state, scenery.signals)
+        _move_traffic(state, scenery, scratch, egos, vehicle_end)
+        move_walkers(state, scenery.walk, scenery.crosswalks, scenery.lanes, vehicle_end)
+        for ego in range(egos):
+            if state.kind[ego] != _ABSENT:
+                move_ego(state, ego, scenery.ego_model)
+        n = resolve_contacts(state, out, n)
+        for ego in range(egos):
+            if state.kind[ego] != _ABSENT:
+                locate_ego(state, scenery.lanes, ego)
+                note_ego_arrival(state, scenery.lanes, ego)
+                advance_progress(state, scenery.routes, ego)
+                n = detect_events(
+                    state, scenery.lanes, scenery.signals, scenery.routes, ego, out, n
+                )
+    return n
+
+
+@kernel
+def _move_traffic(state, scenery, scratch, egos, vehicle_end):
+    """All vehicles decide from the same state, then all move."""
+    lanes, signals, tables = scenery.lanes, scenery.signals, scenery.tables
+    occupancy, requests, leaders = scratch.occupancy, scratch.requests, scratch.leaders
+    mark_busy_crosswalks(state, scenery.walk, scratch.busy)
+    fill_occupancy(occupancy, state, lanes, egos, vehicle_end)
+    change_lanes(occupancy, state, lanes, tables, egos, vehicle_end)
+    find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end)
+    update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end, leaders)
+    for actor in range(egos, vehicle_end):
+        if state.kind[actor] != _ABSENT:
+            scratch.acceleration[actor], scratch.cap[actor] = choose_speed(
+                state, lanes, tables, leaders, requests, scratch.busy, egos, actor
+            )
+    for actor in range(egos, vehicle_end):
+        if state.kind[actor] != _ABSENT:
+            move_vehicle(state, lanes, tables, actor, scratch.acceleration[actor], scratch.cap[actor])
