@@ -1,0 +1,280 @@
+"""The command line: `driveinsight evaluate`, `show`, `agents` and `suites`.
+
+What is slow to import (Numba, the environments) is imported by the command that needs it, and only
+after the arguments are known to be right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.markup import escape
+
+if TYPE_CHECKING:
+    from leaderboard.record import RunRecord
+
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+DESCRIPTION = """Drive agents in closed loop and score them as the CARLA Leaderboard does.
+
+First steps:
+  driveinsight agents                                     who can drive
+  driveinsight suites                                     where
+  driveinsight evaluate --agent expert --suite town05_tiny
+  driveinsight show results/expert-town05_tiny            the table again"""
+
+
+EVALUATE_DESCRIPTION = """Drive an agent over routes and seeds, and print the leaderboard table.
+
+Examples:
+  driveinsight evaluate --agent expert --suite town05_short
+  driveinsight evaluate --agent expert --suite town05_long --seeds 3 --workers 2
+  driveinsight evaluate --agent path/to/mine.py:MyAgent --suite town05_tiny --route-ids 0 3
+  driveinsight evaluate --agent expert --town Town05.xodr --signals town05 \\
+      --routes routes_town05_long.xml
+
+Writes results.json (CARLA's schema) and driveinsight.json (everything) into --output."""
+
+SHOW_DESCRIPTION = """Print the table of a run that was evaluated before.
+
+Example:
+  driveinsight show results/expert-town05_long"""
+
+
+def _says(metavar: str, default: str = "") -> Any:
+    """How an option's value and its default read in the help."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=default and f"(default: {default})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate:
+    """The arguments of `driveinsight evaluate`."""
+
+    agent: Annotated[str, tyro.conf.arg(metavar="AGENT")]
+    """A name (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
+
+    suite: Annotated[str | None, _says("NAME")] = None
+    """A shipped set of routes (see `driveinsight suites`); needless with --routes."""
+
+    seeds: Annotated[int, _says("N", "1")] = 1
+    """How many seeds to drive every route with: 3 means 0, 1 and 2."""
+
+    workers: Annotated[int, _says("N", "1")] = 1
+    """Processes to drive in; the results are the same bits for any number."""
+
+    route_ids: Annotated[tuple[str, ...], _says("ID ...", "all")] = ()
+    """Drive these routes only."""
+
+    town: Annotated[str | None, _says("NAME|FILE", "the suite's")] = None
+    """A shipped town's name or an OpenDRIVE file."""
+
+    routes: Annotated[str | None, _says("FILE", "the suite's")] = None
+    """A route file in CARLA's XML."""
+
+    signals: Annotated[str | None, _says("NAME|FILE", "the map's")] = None
+    """For maps without signals: a sidecar file, a shipped one's name, or `synthesise`."""
+
+    traffic: Annotated[int | None, _says("N", "the suite's")] = None
+    """Number of other vehicles."""
+
+    walkers: Annotated[int | None, _says("N", "the suite's")] = None
+    """Number of walkers."""
+
+    rules: Annotated[str, _says("NAME", "carla-1.0")] = "carla-1.0"
+    """Name of the scoring rules."""
+
+    output: Annotated[Path | None, _says("DIR", "a new one in results/")] = None
+    """Folder for the result files."""
+
+    overwrite: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Replace results that the folder holds already."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Show:
+    """The arguments of `driveinsight show`."""
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
+    """The run's output folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agents:
+    """List the agents that can be named."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suites:
+    """List the suites of routes that are shipped."""
+
+
+Command = (
+    Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_DESCRIPTION)]
+    | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_DESCRIPTION)]
+    | Annotated[Agents, tyro.conf.subcommand("agents")]
+    | Annotated[Suites, tyro.conf.subcommand("suites")]
+)
+
+
+class UsageError(Exception):
+    """What the user asked for cannot be done; one line that says what to do instead."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code: 0, 2 for a wrong request, 130 if interrupted."""
+    command: Command = tyro.cli(
+        Command,
+        prog="driveinsight",
+        description=DESCRIPTION,
+        args=arguments,
+    )
+    try:
+        return _run(command)
+    except KeyboardInterrupt:
+        _complain("interrupted before a route was finished: nothing was kept")
+        return EXIT_INTERRUPTED
+    except UsageError as error:
+        _complain(str(error))
+        return EXIT_USAGE
+
+
+def _run(command: Command) -> int:
+    match command:
+        case Evaluate():
+            return _evaluate(command)
+        case Show():
+            return _show(command)
+        case Agents():
+            return _list_agents()
+        case Suites():
+            return _list_suites()
+
+
+def _complain(message: str) -> None:
+    line = " ".join(message.split())
+    Console(stderr=True, soft_wrap=True, highlight=False).print(f"[red]error[/red]: {escape(line)}")
+
+
+def _evaluate(command: Evaluate) -> int:
+    if command.seeds < 1 or command.workers < 1:
+        raise UsageError("--seeds and --workers must be at least 1")
+    options = _environment_options(command)
+    name = command.suite if command.suite and not command.routes else Path(str(command.routes)).stem
+    folder = command.output or _new_folder(f"{_plain(command.agent)}-{_plain(name)}")
+
+    from leaderboard.results import ResultsError, prepare_folder
+
+    try:
+        prepare_folder(folder, overwrite=command.overwrite)
+    except ResultsError as error:
+        raise UsageError(str(error)) from error
+
+    from leaderboard.jobs import RunSpec
+    from leaderboard.runner import evaluate
+    from leaderboard.warm_up import SetupError
+
+    spec = RunSpec(agent=command.agent, options=options, rules=command.rules)
+    try:
+        run = evaluate(
+            spec, range(command.seeds), suite=name, folder=folder, workers=command.workers
+        )
+    except (SetupError, ResultsError) as error:
+        _remove_if_empty(folder)
+        raise UsageError(str(error)) from error
+    _print_run(run, folder)
+    return 0 if run.complete else EXIT_INTERRUPTED
+
+
+def _environment_options(command: Evaluate) -> dict[str, Any]:
+    """The options that were given, checked as far as that goes without loading a town."""
+    from di_envs.config import RouteEnvConfig
+
+    names = ("suite", "town", "routes", "signals", "traffic", "walkers", "rules")
+    given = {name: getattr(command, name) for name in names}
+    options = {name: value for name, value in given.items() if value is not None}
+    if command.route_ids:
+        options["route_ids"] = command.route_ids
+    try:
+        RouteEnvConfig.from_mapping(options)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    return options
+
+
+def _plain(name: str) -> str:
+    """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
+    last = name.rpartition(":")[2]
+    return "".join(c if c.isalnum() or c in "_-." else "_" for c in last)
+
+
+def _new_folder(name: str) -> Path:
+    """`results/NAME`, or `results/NAME-2` and so on where that is taken."""
+    folder, number = Path("results") / name, 2
+    while folder.exists():
+        folder, number = Path("results") / f"{name}-{number}", number + 1
+    return folder
+
+
+def _remove_if_empty(folder: Path) -> None:
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def _print_run(run: RunRecord, folder: Path) -> None:
+    from leaderboard.report import print_run
+    from leaderboard.results import CARLA_FILE, RECORD_FILE
+
+    console = Console()
+    print_run(run, console)
+    console.print(
+        f"Written: {folder / CARLA_FILE} (CARLA's schema) and {folder / RECORD_FILE} (all of it).",
+        f"Next: driveinsight show {folder}",
+        sep="\n",
+        highlight=False,
+        soft_wrap=True,
+        markup=False,
+    )
+
+
+def _show(command: Show) -> int:
+    from leaderboard.report import print_run
+    from leaderboard.results import ResultsError, read_run
+
+    try:
+        run = read_run(command.folder)
+    except ResultsError as error:
+        raise UsageError(str(error)) from error
+    print_run(run, Console())
+    return 0
+
+
+def _list_agents() -> int:
+    from leaderboard.listing import agent_table
+
+    Console().print(
+        agent_table(),
+        "Your own: --agent module:Class or --agent path/to/file.py:Class (see agents/base.py).",
+        "Next: driveinsight evaluate --agent expert --suite town05_tiny",
+        sep="\n",
+        highlight=False,
+    )
+    return 0
+
+
+def _list_suites() -> int:
+    from leaderboard.listing import suite_table
+
+    Console().print(
+        suite_table(),
+        "Your own: --town FILE.xodr --routes FILE.xml (CARLA's formats).",
+        "Next: driveinsight evaluate --agent expert --suite town05_short",
+        sep="\n",
+        highlight=False,
+    )
+    return 0

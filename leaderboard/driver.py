@@ -1,0 +1,64 @@
+"""An environment and a way to make the agent, ready to drive one job after another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any
+
+from di_envs.route_env import RouteEnv
+
+from agents import load_agent
+from agents.base import Agent, Requirements
+from leaderboard.episode import drive_route
+from leaderboard.jobs import Job, RunSpec
+from leaderboard.record import RouteRecord
+from leaderboard.rules import rules_named
+
+
+class Driver:
+    """Drives jobs of one run. The environment is kept; the agent is made anew for each route,
+    as in CARLA, so that one that hides its memory cannot carry it from route to route."""
+
+    def __init__(self, spec: RunSpec, requires: Requirements | None = None) -> None:
+        self._spec = spec
+        self._rules = rules_named(spec.rules)
+        self.requires = requires or agent_requirements(spec.agent)
+        self.env = RouteEnv(**environment_options(spec.options, self.requires))
+
+    def new_agent(self) -> Agent[Any]:
+        return load_agent(self._spec.agent)
+
+    def drive(self, job: Job) -> RouteRecord:
+        """Drives one route; never raises for what the agent does."""
+        return drive_route(self.env, self.new_agent, job, self._rules)
+
+    def __enter__(self) -> Driver:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.env.close()
+
+
+def agent_requirements(spec: str) -> Requirements:
+    """What the agent of that spec requires; raises whatever making it raises."""
+    agent = load_agent(spec)
+    try:
+        return agent.requires
+    finally:
+        agent.close()
+
+
+def environment_options(options: Mapping[str, Any], requires: Requirements) -> dict[str, Any]:
+    """Environment options of a run: what the agent requires, and over it what the user says."""
+    return {
+        **requires.options,
+        "observations": requires.observations,
+        "control_dt_s": requires.control_dt_s,
+        **options,
+    }

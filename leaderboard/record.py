@@ -1,0 +1,124 @@
+"""What is kept of a run: values that a file, a table or another run can be made from.
+
+Everything but the wall-clock time is a function of (agent, options, route, seed): `fingerprint`
+leaves that out, so two runs are the same exactly when their fingerprints are.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from di_envs.world.state import EventKind
+from leaderboard.score import Score
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventRecord:
+    """Something that the rules count, with its time and place (world frame)."""
+
+    kind: EventKind
+    tick: int
+    time_s: float
+    x: float
+    y: float
+    z: float
+    other: int = -1  # the other actor, the signal, or -1
+    other_type: str = ""  # CARLA's name of such an actor, such as `vehicle.car`
+    value: float = 0.0  # metres for OUTSIDE_LANES
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """What a perfect driver gets on the route with these lights and no traffic.
+
+    Attributes:
+        route_completion: RC in percent when it finishes or the route times out; also its DS, as it
+            commits no infraction.
+        finish_s: Game time at which it finishes; None when it cannot.
+        stopped_s: Time for which it stood still.
+    """
+
+    route_completion: float
+    finish_s: float | None
+    stopped_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteRecord:
+    """One route driven once.
+
+    Attributes:
+        index: Position in the run, counted over routes and seeds.
+        world_seed: What the environment was seeded with, a function of `seed` and `route_id`.
+        status: CARLA's status, such as `Completed` or `Failed - Agent timed out`.
+        reason: Why it failed, in a sentence, where the status alone does not say.
+        keypoints_m: Length of the polyline of the route file's keypoints.
+        travelled_m: Route metres over which metres outside lanes were counted.
+        wall_s: Wall-clock time that it took; the only thing here that a rerun changes.
+        observation_hash: BLAKE2b of every observation in order; so the other two.
+    """
+
+    route_id: str
+    seed: int
+    index: int
+    world_seed: int
+    status: str
+    reason: str = ""
+    score: Score
+    length_m: float
+    keypoints_m: float
+    done_m: float
+    travelled_m: float
+    game_s: float
+    steps: int
+    wall_s: float
+    bound: Bound | None
+    events: tuple[EventRecord, ...] = ()
+    route_hash: str
+    observation_hash: str
+    reward_hash: str
+    event_hash: str
+
+    @property
+    def crashed(self) -> bool:
+        """Whether code failed, the agent's or the simulator's, rather than the driving."""
+        return bool(self.reason)
+
+    def fingerprint(self) -> tuple[Any, ...]:
+        """All that a rerun must give again, bit for bit."""
+        values = dataclasses.asdict(dataclasses.replace(self, wall_s=0.0))
+        return tuple(sorted((name, repr(value)) for name, value in values.items()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRecord:
+    """A run of one agent over routes and seeds, finished or not.
+
+    Attributes:
+        options: Environment options that differ from the defaults.
+        versions: Package name to version, for all that can change bits.
+        cpu: CPU capability that the kernels were compiled for.
+        planned: Number of (route, seed) pairs that were asked for.
+        routes: Those driven, by `index`.
+    """
+
+    rules: str
+    agent: str
+    track: str
+    requires: Mapping[str, Any]
+    suite: str
+    options: Mapping[str, Any]
+    town: str
+    town_hash: str
+    seeds: tuple[int, ...]
+    versions: Mapping[str, str]
+    cpu: str
+    planned: int
+    routes: tuple[RouteRecord, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        return len(self.routes) == self.planned

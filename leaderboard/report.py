@@ -1,0 +1,157 @@
+"""The leaderboard as a terminal table: scores by route with the bound beside them, and means."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console, Group
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from di_envs.world.state import EventKind
+from leaderboard.confidence import Interval, mean_interval
+from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.rules import rules_named
+from leaderboard.score import count_infractions, infractions_per_km
+
+SHORT_NAMES = {
+    EventKind.COLLISION_WALKER: "walker hit",
+    EventKind.COLLISION_VEHICLE: "vehicle hit",
+    EventKind.COLLISION_STATIC: "object hit",
+    EventKind.RED_LIGHT: "red light",
+    EventKind.STOP_SIGN: "stop sign",
+    EventKind.OUTSIDE_LANES: "outside lanes",
+    EventKind.ROUTE_DEVIATION: "off route",
+    EventKind.TIMEOUT: "timeout",
+    EventKind.BLOCKED: "blocked",
+}
+
+
+def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int]) -> list[float]:
+    """One mean over routes for each seed that has any, of `value`, a property of `Score`."""
+    by_seed = ([getattr(r.score, value) for r in records if r.seed == seed] for seed in seeds)
+    return [math.fsum(values) / len(values) for values in by_seed if values]
+
+
+def run_tables(run: RunRecord) -> Group:
+    """The leaderboard table of a run, its infractions by kind, and what they rest on."""
+    if not run.routes:
+        return Group(Text("no route was finished: there is nothing to show"))
+    return Group(_route_table(run), _infraction_table(run), Text(_caption(run), style="dim"))
+
+
+def print_run(run: RunRecord, console: Console) -> None:
+    """Prints the tables of a run."""
+    console.print(run_tables(run))
+
+
+def _route_table(run: RunRecord) -> Table:
+    title = f"{escape(run.agent)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
+    table = Table(title=title, title_justify="left", title_style="bold")
+    table.add_column("route")
+    for name in ("DS", "RC", "IS", "bound", "infr./km"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("what happened", overflow="fold")
+    for route_id in dict.fromkeys(record.route_id for record in run.routes):
+        table.add_row(
+            escape(route_id), *_cells([r for r in run.routes if r.route_id == route_id], run)
+        )
+    table.add_section()
+    table.add_row("mean", *_mean_cells(run), style="bold")
+    return table
+
+
+def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
+    """DS, RC, IS, bound, infractions per km and a summary, over the seeds of one route."""
+    scores = [record.score for record in records]
+    return [
+        f"{_mean([score.driving_score for score in scores]):.1f}",
+        f"{_mean([score.route_completion for score in scores]):.1f}",
+        f"{_mean([score.infraction_score for score in scores]):.2f}",
+        _bound_cell(records),
+        f"{_scored_per_km(records, run):.2f}",
+        escape(_summary(records)),
+    ]
+
+
+def _mean_cells(run: RunRecord) -> list[str]:
+    completion = mean_interval(seed_means(run.routes, "route_completion", run.seeds))
+    penalty = mean_interval(seed_means(run.routes, "infraction_score", run.seeds))
+    penalty_text = f"{penalty.mean:.2f}"
+    if penalty.half_width is not None:
+        penalty_text += f" ± {penalty.half_width:.2f}"
+    return [
+        str(driving_interval(run)),
+        str(completion),
+        penalty_text,
+        _bound_cell(run.routes),
+        f"{_scored_per_km(run.routes, run):.2f}",
+        "",
+    ]
+
+
+def driving_interval(run: RunRecord) -> Interval:
+    """The run's mean DS, with the t-interval of its means by seed."""
+    return mean_interval(seed_means(run.routes, "driving_score", run.seeds))
+
+
+def mean_bound(records: Iterable[RouteRecord]) -> float | None:
+    """The mean light-limited DS of those routes for which it is known."""
+    bounds = [record.bound.route_completion for record in records if record.bound is not None]
+    return _mean(bounds) if bounds else None
+
+
+def _bound_cell(records: Iterable[RouteRecord]) -> str:
+    bound = mean_bound(records)
+    return "-" if bound is None else f"{bound:.1f}"
+
+
+def _mean(values: Sequence[float]) -> float:
+    return math.fsum(values) / len(values)
+
+
+def _scored_per_km(records: Sequence[RouteRecord], run: RunRecord) -> float:
+    """Infractions that lower IS, per kilometre driven, over all these records together."""
+    rules = rules_named(run.rules)
+    scored = rules.factors.keys() | rules.proportional
+    count = sum(event.kind in scored for record in records for event in record.events)
+    return infractions_per_km(count, math.fsum(record.done_m for record in records))
+
+
+def _summary(records: Sequence[RouteRecord]) -> str:
+    """What went wrong, counted: `2 red light, 1 timeout, 1 agent crashed`."""
+    kinds = count_infractions(event.kind for record in records for event in record.events)
+    parts = [f"{count} {SHORT_NAMES[kind]}" for kind, count in kinds.items() if count]
+    crashes = Counter(record.status for record in records if record.crashed)
+    parts += [f"{count} {status.removeprefix('Failed - ')}" for status, count in crashes.items()]
+    return ", ".join(parts)
+
+
+def _infraction_table(run: RunRecord) -> Table:
+    table = Table(title="infractions per km", title_justify="left", title_style="bold")
+    counts = count_infractions(event.kind for record in run.routes for event in record.events)
+    driven_m = math.fsum(record.done_m for record in run.routes)
+    for kind in counts:
+        table.add_column(SHORT_NAMES[kind], justify="right")
+    table.add_row(*(f"{infractions_per_km(count, driven_m):.3f}" for count in counts.values()))
+    return table
+
+
+def _caption(run: RunRecord) -> str:
+    routes = len({record.route_id for record in run.routes})
+    driven_km = math.fsum(record.done_m for record in run.routes) / 1000.0
+    seeds = len({record.seed for record in run.routes})
+    if seeds == 1:
+        doubt = f"one seed ({run.routes[0].seed}): no confidence interval"
+    else:
+        doubt = f"± is the 95 % t-interval of the means of {seeds} seeds"
+    lines = [
+        f"{routes} routes of {run.town}, {driven_km:.1f} km driven; {doubt}.",
+        "bound: DS of a perfect driver on empty roads with the same lights, under the timeout.",
+    ]
+    if not run.complete:
+        lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
+    return "\n".join(lines)
