@@ -1,4 +1,4 @@
-"""Saves and restores an environment with every wrapper's memory, so that an episode can be branched.
+"""Saves and restores an environment and its wrappers' memory, so that episodes can be branched.
 
 A world's state alone does not make an environment: a time limit counts, a frame stack remembers.
 `save` walks the chain from the outermost wrapper to the environment and takes each layer's memory.
@@ -120,7 +120,7 @@ def _memory(wrapper: Any) -> dict[str, Any]:
 
 
 def _copied(memory: dict[str, Any], layer: Any, chain: list[Any]) -> dict[str, Any]:
-    """A deep copy that stops at the chain's layers and the environment's parts, such as its world."""
+    """A deep copy that stops at the chain's layers and the environment's parts (its world)."""
     kept = {id(part): part for part in (*chain, *vars(chain[-1]).values())}
     try:
         return copy.deepcopy(memory, kept)

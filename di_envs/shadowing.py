@@ -43,10 +43,10 @@ def _folders(name: str) -> list[Path]:
     module = sys.modules.get(name)
     if module is not None:
         origin = getattr(module, "__file__", None)
-        places = [Path(origin).parent] if origin else list(getattr(module, "__path__", ()))
+        places = [str(Path(origin).parent)] if origin else list(getattr(module, "__path__", ()))
     else:
         spec = find_spec(name)
         if spec is None:
             return []
-        places = list(spec.submodule_search_locations or [Path(str(spec.origin)).parent])
+        places = list(spec.submodule_search_locations or [str(Path(str(spec.origin)).parent)])
     return [Path(place).resolve() for place in places]
