@@ -149,7 +149,10 @@ def curve_between(start: Pose, end: Pose) -> Curve:
 
 
 def _biarc(start: Pose, end: Pose) -> Curve:
-    """Two arcs of equal tangent lengths. Source: Bolton, Biarc curves, Computer-Aided Design 1975."""
+    """Two arcs with tangents of one length.
+
+    Source: Bolton: Biarc curves, Computer-Aided Design 1975.
+    """
     sx, sy = math.cos(start.heading), math.sin(start.heading)
     ex, ey = math.cos(end.heading), math.sin(end.heading)
     vx, vy = end.x - start.x, end.y - start.y

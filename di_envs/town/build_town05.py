@@ -1,4 +1,4 @@
-"""Writes the shipped Town05-style map from its table of facts: `python -m di_envs.town.build_town05`.
+"""Writes the shipped Town05-style map from its table: `python -m di_envs.town.build_town05`.
 
 The table (`data/town05_facts.json`) holds what a person would measure on CARLA's Town05 with a
 ruler: ends and corners of 38 streets to 0.1 m, corner radii, lane counts, heights of the elevated

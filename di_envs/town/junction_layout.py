@@ -203,7 +203,7 @@ def _connector(junction: Junction, way: Movement, road_id: int, head: int | None
     end = target.outbound_edge(target.street.section.inner_edge_m(way.target_lane))
     lanes = range(way.lanes)
     strips = (Strip("driving", LANE_WIDTH_M, "none"),) * way.lanes
-    references = ()
+    references: tuple[ReferenceRecord, ...] = ()
     if head is not None:
         references = (ReferenceRecord(signal=head, station_m=0.5, first=-1, last=-way.lanes),)
     return RoadRecord(
@@ -307,7 +307,7 @@ def _controllers(
 def _with_crosswalk(
     roads: list[RoadRecord], corners: list[RoadRecord], arm: Arm, ids: Iterator[int]
 ) -> list[RoadRecord]:
-    """Adds the crosswalk over an arm's mouth, where the sidewalks of both corners can be reached."""
+    """Adds the crosswalk over an arm's mouth, where both of its corners have a sidewalk."""
     right = next((road for road in corners if _leaves(road.predecessor, arm)), None)
     left = next((road for road in corners if _leaves(road.successor, arm)), None)
     if right is None or left is None:

@@ -216,7 +216,7 @@ def _lane(side: ET.Element, lane_id: int, strip: Strip, road: RoadRecord) -> Non
 
 def _road_mark(lane: ET.Element, line: str) -> None:
     """Writes a line such as "broken" or "solid yellow"; only broken lines may be crossed."""
-    kind, _, color = line.partition(" yellow")
+    kind = line.removesuffix(" yellow")
     mark = _add(lane, "roadMark", sOffset=0, type=kind, material="standard")
     mark.set("color", "yellow" if line != kind else "white")
     mark.set("width", "0.15")
