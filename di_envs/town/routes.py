@@ -1,0 +1,204 @@
+"""CARLA route files: reading them, in the layouts of Leaderboard 1.0 and 2.x, and writing them.
+
+1.0 lists `<waypoint x= y= z= pitch= roll= yaw=/>` below each `<route>`, 2.x lists
+`<waypoints><position x= y= z=/></waypoints>`; each may say its weather. Scenarios, which 2.x puts
+into the same file, are not read.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Layout = Literal["1.0", "2.x"]
+
+
+class RouteFileError(ValueError):
+    """A route file that cannot be used; the message names the file and the place in it."""
+
+
+class Keypoint(NamedTuple):
+    """One waypoint of a route file: world frame (y south), angles as the file has them."""
+
+    x: float  # m
+    y: float
+    z: float
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
+    yaw_deg: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteWeather:
+    """A `<weather>` of a route: CARLA's weather parameters, under CARLA's names and units.
+
+    Attributes:
+        name: The `id` that some files give it, empty if none.
+        parameters: Such as `cloudiness` or `sun_altitude_angle`; in 2.x also `route_percentage`,
+            the share of the route at which it is reached.
+    """
+
+    name: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteSpec:
+    """A route as its file describes it."""
+
+    route_id: str
+    town: str
+    keypoints: tuple[Keypoint, ...]
+    weathers: tuple[RouteWeather, ...] = ()
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(K, 3) x, y, z of the keypoints: all that the planner reads."""
+        return np.array([keypoint[:3] for keypoint in self.keypoints], dtype=np.float64)
+
+
+def read_routes(path: str | Path) -> list[RouteSpec]:
+    """Reads a CARLA route file.
+
+    Args:
+        path: XML file; both layouts are understood, route by route.
+
+    Returns:
+        The routes in the order of the file; at least one.
+
+    Raises:
+        RouteFileError: If the file is missing, is no XML, holds no routes, or if a route lacks its
+            id, its town or two keypoints, has a coordinate that is no finite number, or has the id
+            of an earlier route.
+    """
+    path = Path(path)
+    routes: dict[str, RouteSpec] = {}
+    for element in _root_of(path).iter("route"):
+        route = _route(element, path)
+        if route.route_id in routes:
+            raise RouteFileError(
+                f"{path}: two routes have the id '{route.route_id}'; give each an id of its own."
+            )
+        routes[route.route_id] = route
+    if not routes:
+        raise RouteFileError(
+            f"{path}: expected <route> elements as in CARLA's route files, found none."
+        )
+    return list(routes.values())
+
+
+def write_routes(path: str | Path, routes: Iterable[RouteSpec], layout: Layout = "1.0") -> None:
+    """Writes a CARLA route file that `read_routes` reads back unchanged.
+
+    The 2.x layout has no angles, so they are lost there.
+
+    Raises:
+        RouteFileError: If there are no routes, or if two have one id.
+    """
+    routes = list(routes)
+    ids = [route.route_id for route in routes]
+    if not routes or len(set(ids)) < len(ids):
+        raise RouteFileError(
+            f"{path}: expected at least one route and a different id for each, got ids {ids}."
+        )
+    root = ET.Element("routes")
+    for route in routes:
+        element = ET.SubElement(root, "route", id=route.route_id, town=route.town)
+        _write_weathers(element, route.weathers)
+        if layout == "2.x":
+            element = ET.SubElement(element, "waypoints")
+        for keypoint in route.keypoints:
+            _write_keypoint(element, keypoint, layout)
+    ET.indent(root, "  ")
+    text = ET.tostring(root, encoding="unicode", xml_declaration=False)
+    declaration = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    Path(path).write_text(f"{declaration}{text}\n", encoding="utf-8")
+
+
+def _root_of(path: Path) -> ET.Element:
+    try:
+        return ET.parse(path).getroot()
+    except FileNotFoundError:
+        raise RouteFileError(f"{path}: there is no such route file; check the path.") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise RouteFileError(f"{path}: the route file cannot be read: {error}.") from error
+    except ET.ParseError as error:
+        raise RouteFileError(
+            f"{path}: expected CARLA route XML, but it is not well-formed: {error}."
+        ) from error
+
+
+def _route(element: ET.Element, path: Path) -> RouteSpec:
+    route_id, town = element.get("id"), element.get("town")
+    if not route_id or not town:
+        raise RouteFileError(
+            f"{path}: expected <route id=… town=…>, got attributes {dict(element.attrib)}."
+        )
+    points = element.findall("waypoint") or element.findall("waypoints/position")
+    if len(points) < 2:
+        raise RouteFileError(
+            f"{path}: route '{route_id}' has {len(points)} keypoints; expected at least two "
+            "<waypoint> or <waypoints><position> elements, a start and an end."
+        )
+    return RouteSpec(
+        route_id=route_id,
+        town=town,
+        keypoints=tuple(_keypoint(point, f"{path}: route '{route_id}'") for point in points),
+        weathers=tuple(_weather(weather) for weather in element.iter("weather")),
+    )
+
+
+def _keypoint(element: ET.Element, where: str) -> Keypoint:
+    place = [_number(element, key, where) for key in "xyz"]
+    angles = [_number(element, key, where, "0") for key in ("pitch", "roll", "yaw")]
+    return Keypoint(*place, *angles)
+
+
+def _number(element: ET.Element, key: str, where: str, default: str | None = None) -> float:
+    text = element.get(key, default)
+    try:
+        value = float(text if text is not None else "missing")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RouteFileError(
+            f"{where}: expected a finite number for '{key}' of <{element.tag}>, got {text!r}."
+        )
+    return value
+
+
+def _weather(element: ET.Element) -> RouteWeather:
+    parameters = {}
+    for key, text in element.attrib.items():
+        try:
+            parameters[key] = float(text)
+        except ValueError:
+            continue  # a name, not a parameter
+    parameters.pop("id", None)
+    return RouteWeather(name=element.get("id", ""), parameters=parameters)
+
+
+def _write_weathers(route: ET.Element, weathers: Iterable[RouteWeather]) -> None:
+    weathers = list(weathers)
+    parent = route if len(weathers) == 1 else None
+    for weather in weathers:
+        parent = ET.SubElement(route, "weathers") if parent is None else parent
+        element = ET.SubElement(parent, "weather")
+        if weather.name:
+            element.set("id", weather.name)
+        for key, value in weather.parameters.items():
+            element.set(key, repr(float(value)))
+
+
+def _write_keypoint(parent: ET.Element, keypoint: Keypoint, layout: Layout) -> None:
+    keys = ("x", "y", "z", "pitch", "roll", "yaw") if layout == "1.0" else ("x", "y", "z")
+    element = ET.SubElement(parent, "waypoint" if layout == "1.0" else "position")
+    for key, value in zip(keys, keypoint, strict=False):
+        element.set(key, repr(float(value)))
