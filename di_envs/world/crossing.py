@@ -1,0 +1,142 @@
+# mypy: disallow_untyped_defs=False
+"""When a walker may step onto a crosswalk, and what stops one who is on it."""
+
+from __future__ import annotations
+
+import math
+
+from di_envs.geometry import boxes_overlap
+from di_envs.kernels import kernel
+from di_envs.town.lanes import LightState
+from di_envs.world.lights import TURN_TICKS
+from di_envs.world.state import PATH_LANES, TICK_S, ActorKind
+
+SAME_LEVEL_M = 3.0
+COMFORTABLE_MPS2 = 2.5  # braking that walkers expect of drivers …
+REACTION_S = 0.7  # … after this time …
+ROOM_M = 3.0  # … to a stop this far before the strip
+STANDS_MPS = 0.3  # a vehicle slower than this is taken to stand
+SPARE_TICKS = round(1.0 / TICK_S)  # of red left when a walker has crossed
+BODY_M = 0.25  # half a walker's width
+MARGIN_M = 0.3  # kept from bodies
+LOOK_S = 1.0  # of a vehicle's way ahead that walkers do not step into
+
+RED = int(LightState.RED)
+FIRST_VEHICLE, LAST_VEHICLE = int(ActorKind.CAR), int(ActorKind.BICYCLE)
+
+
+@kernel
+def is_vehicle(state, actor):
+    return FIRST_VEHICLE <= state.kind[actor] <= LAST_VEHICLE
+
+
+@kernel
+def ticks_to_green(state, signals, signal):
+    """Ticks until a light that is red turns green."""
+    junction = signals.junction[signal]
+    turns = (signals.group[signal] - state.phase_group[junction]) % signals.groups[junction]
+    if turns == 0:  # its own turn is at its end
+        turns = signals.groups[junction]
+    return turns * TURN_TICKS - state.phase_ticks[junction]
+
+
+@kernel
+def _lights_hold(state, walk, signals, crosswalk, needed_ticks):
+    """Whether every light of the crossed arm is red, and stays so for long enough."""
+    for k in range(walk.light_start[crosswalk], walk.light_start[crosswalk + 1]):
+        signal = walk.light[k]
+        if state.light[signal] != RED:
+            return False
+        if ticks_to_green(state, signals, signal) < needed_ticks + SPARE_TICKS:
+            return False
+    return True
+
+
+@kernel
+def _is_on_strip(state, walk, crosswalk, actor):
+    strip = walk.strip[crosswalk]
+    if abs(state.z[actor] - strip[2]) >= SAME_LEVEL_M:
+        return False
+    return boxes_overlap(
+        strip[0],
+        strip[1],
+        strip[3],
+        strip[4],
+        strip[5],
+        state.x[actor],
+        state.y[actor],
+        state.yaw[actor],
+        state.half_length[actor],
+        state.half_width[actor],
+    )
+
+
+@kernel
+def _goes_over(state, actor, lane):
+    """Whether a vehicle's chosen path has this lane; an ego's is unknown, so it might."""
+    if actor < state.throttle.shape[0]:
+        return True
+    found = False
+    for k in range(PATH_LANES):
+        found = found or state.path[actor, k] == lane
+    return found
+
+
+@kernel
+def _could_stop(state, actor, gap_m):
+    speed = state.speed[actor]
+    needed = speed * speed / (2.0 * COMFORTABLE_MPS2) + REACTION_S * speed
+    if speed >= STANDS_MPS:
+        needed += ROOM_M
+    return gap_m >= needed
+
+
+@kernel
+def _leaves_room(state, walk, crosswalk, actor):
+    """Whether a vehicle is off the strip, and not heading for it or able to stop comfortably."""
+    if _is_on_strip(state, walk, crosswalk, actor):
+        return False
+    lane = state.lane[actor]
+    if lane < 0:
+        return True
+    front = state.lane_m[actor] + state.half_length[actor]
+    rear = state.lane_m[actor] - state.half_length[actor]
+    for k in range(walk.approach_start[lane], walk.approach_start[lane + 1]):
+        if walk.approach[k] != crosswalk or rear >= walk.approach_end_m[k]:
+            continue
+        if _goes_over(state, actor, walk.approach_lane[k]):
+            if not _could_stop(state, actor, walk.approach_begin_m[k] - front):
+                return False
+    return True
+
+
+@kernel
+def may_cross(state, walk, signals, crosswalk, needed_ticks):
+    """Whether a walker who needs so many ticks may step onto a crosswalk now."""
+    if not _lights_hold(state, walk, signals, crosswalk, needed_ticks):
+        return False
+    for actor in range(state.kind.shape[0]):
+        if is_vehicle(state, actor) and not _leaves_room(state, walk, crosswalk, actor):
+            return False
+    return True
+
+
+@kernel
+def is_in_the_way(state, actor, x, y, z, step_x, step_y, margin_m):
+    """Whether a step from (x, y) would go into a vehicle or the second of way ahead of it.
+
+    Steps away from its middle are always free, so that nobody is held by a body beside them.
+    """
+    dx, dy = state.x[actor] - x, state.y[actor] - y
+    reach = state.half_length[actor] + LOOK_S * state.speed[actor] + 2.0
+    if abs(dx) > reach or abs(dy) > reach or abs(state.z[actor] - z) >= SAME_LEVEL_M:
+        return False
+    if dx * step_x + dy * step_y <= 0.0:
+        return False
+    cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
+    ahead = (step_x - dx) * cos + (step_y - dy) * sin
+    right = (step_y - dy) * cos - (step_x - dx) * sin
+    room = BODY_M + margin_m
+    front = state.half_length[actor] + LOOK_S * state.speed[actor] + room
+    in_length = -state.half_length[actor] - room < ahead < front
+    return in_length and abs(right) < state.half_width[actor] + room
