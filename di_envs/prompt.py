@@ -103,14 +103,14 @@ def scene_of(state: State) -> Scene:
 
 
 def stop_lines_of(signals: Signals) -> StopLines:
-    """The stop lines of a town's signals."""
+    """The stop lines of a town's signals. Copied, as read-only arrays would compile kernels anew."""
     kind = signals.kind[signals.stop_signal].astype(np.int8)
-    return StopLines(signals.stop_pose, signals.stop_signal, kind)
+    return StopLines(signals.stop_pose.copy(), signals.stop_signal.copy(), kind)
 
 
 def prompt_route_of(plan: RoutePlan) -> PromptRoute:
-    """The parts of a plan that the prompt reads."""
-    return PromptRoute(plan.points, plan.option, plan.targets)
+    """The parts of a plan that the prompt reads. Copied, for the same reason."""
+    return PromptRoute(plan.points.copy(), plan.option.copy(), plan.targets.copy())
 
 
 def empty_prompt() -> Prompt:

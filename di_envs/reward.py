@@ -1,7 +1,7 @@
 """The reward: how much the driving score, in metres, grew in a step, as named terms.
 
-Score in metres = (route metres done - metres outside the lanes) x penalty of each infraction so
-far. A step's reward is its growth, so an episode's return is `route length x driving score / 100`:
+Score in metres = route metres done x (1 - share of them outside the lanes) x penalty of each
+infraction so far. A step's reward is its growth, so an episode's return is `route length x driving score / 100`:
 what the Leaderboard counts is what is learned. The terms add up to the reward exactly as written:
 progress first, then metres outside, both at the penalty before the step, then each infraction.
 """
@@ -34,17 +34,22 @@ class Standing(NamedTuple):
     """How far an ego has come, and what it has done wrong."""
 
     done_m: float  # metres of the dense route completed
-    outside_m: float  # of these, outside the lanes or against them
+    outside_share: float  # of the route metres so far, outside the lanes or against them, 0..1
     counts: tuple[int, ...]  # events so far, by EventKind
 
 
 def standing_of(state: State, ego: int) -> Standing:
     """An ego's standing in the present state."""
-    return Standing(
-        float(state.route_done_m[ego]),
-        float(state.outside_m[ego]),
-        tuple(state.counts[ego].tolist()),
-    )
+    outside_m = float(state.outside_m[ego])
+    # Counted over route points of its own, as CARLA does: nearly, not exactly, the metres done.
+    share = min(outside_m / float(state.outside_done_m[ego]), 1.0) if outside_m > 0.0 else 0.0
+    counts = tuple(state.counts[ego].tolist())
+    return Standing(float(state.route_done_m[ego]), share, counts)
+
+
+def inside_metres(standing: Standing) -> float:
+    """Route metres done, less the share outside the lanes."""
+    return standing.done_m * (1.0 - standing.outside_share)
 
 
 def infraction_penalty(standing: Standing, penalties: Mapping[EventKind, float]) -> float:
@@ -57,8 +62,7 @@ def infraction_penalty(standing: Standing, penalties: Mapping[EventKind, float])
 
 def score_metres(standing: Standing, penalties: Mapping[EventKind, float]) -> float:
     """The driving score in metres of the route: what a step's reward is the growth of."""
-    inside_m = max(standing.done_m - standing.outside_m, 0.0)
-    return inside_m * infraction_penalty(standing, penalties)
+    return inside_metres(standing) * infraction_penalty(standing, penalties)
 
 
 def reward_terms(
@@ -76,14 +80,13 @@ def reward_terms(
         infraction, named as the event: what the infraction takes of the score, 0 or negative.
     """
     penalty = infraction_penalty(before, penalties)
-    inside_before = max(before.done_m - before.outside_m, 0.0)
-    inside_after = max(after.done_m - after.outside_m, 0.0)
     progress_m = after.done_m - before.done_m
+    inside_m = inside_metres(after)
     terms = {
         "progress": progress_m * penalty,
-        "outside_lanes": (inside_after - inside_before - progress_m) * penalty,
+        "outside_lanes": (inside_m - inside_metres(before) - progress_m) * penalty,
     }
-    score = inside_after * penalty
+    score = inside_m * penalty
     for kind, factor in penalties.items():
         left = score * factor ** (after.counts[kind] - before.counts[kind])
         terms[kind.name.lower()] = left - score
