@@ -1,0 +1,124 @@
+"""Parsed towns in the user's cache folder, safe when several processes write at once.
+
+A town is one `.npz` file named by the hash of all that it was made from. A file that cannot be read
+is no error: the town is parsed again and the file replaced.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from platformdirs import user_cache_path
+
+from di_envs.town.lanes import Crosswalks, Lanes, Signals
+from di_envs.town.town import Town
+
+# The modules that decide what a town's arrays hold; a test compares them with what is imported.
+READER_MODULES = (
+    "cache",
+    "conflicts",
+    "lanes",
+    "links",
+    "loading",
+    "network",
+    "opendrive",
+    "queries",
+    "reference_line",
+    "sampling",
+    "stretches",
+    "town",
+)
+
+
+def cache_folder() -> Path:
+    """Where parsed towns are kept."""
+    return user_cache_path("driveinsight") / "towns"
+
+
+def reader_version() -> str:
+    """A hash of the reader's own source: another reader may read otherwise."""
+    digest = hashlib.sha256()
+    for name in READER_MODULES:
+        path = Path(__file__).with_name(f"{name}.py")
+        digest.update(name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def content_hash(opendrive: bytes, signals: str) -> str:
+    """The identity of a town: its OpenDRIVE file, its signals and the reader."""
+    digest = hashlib.sha256(opendrive)
+    digest.update(b"\0" + signals.encode() + b"\0" + reader_version().encode())
+    return digest.hexdigest()[:32]
+
+
+def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | None:
+    """The town of a key, or None where there is no readable one."""
+    path = folder / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            about = json.loads(str(stored["about"]))
+            arrays = {
+                part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
+                for part, kind in _PARTS.items()
+            }
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    if about.get("key") != key:
+        return None
+    return Town(
+        name=name,
+        road_names=tuple(about["road_names"]),
+        junction_names=tuple(about["junction_names"]),
+        geo_origin=(about["geo_origin"][0], about["geo_origin"][1]),
+        content_hash=key,
+        opendrive=opendrive,
+        **arrays,
+    )
+
+
+_PARTS: dict[str, type] = {"lanes": Lanes, "signals": Signals, "crosswalks": Crosswalks}
+
+
+def store(town: Town, folder: Path) -> None:
+    """Writes a town for later; a cache folder that cannot be written is not an error."""
+    about = {
+        "key": town.content_hash,
+        "road_names": town.road_names,
+        "junction_names": town.junction_names,
+        "geo_origin": town.geo_origin,
+    }
+    arrays = {
+        f"{part}.{field}": value
+        for part in _PARTS
+        for field, value in getattr(town, part)._asdict().items()
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=folder, suffix=".tmp")
+    except OSError:
+        return
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, about=np.array(json.dumps(about)), **arrays)
+        os.replace(temporary, folder / f"{town.content_hash}.npz")
+    except OSError:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def freeze(town: Town) -> Town:
+    """The same town; its arrays can no longer be written."""
+    for part in _PARTS:
+        for array in getattr(town, part):
+            array.flags.writeable = False
+    return town
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
