@@ -1,5 +1,5 @@
 # mypy: disallow_untyped_defs=False
-"""How an ego moves under throttle, brake and steering: a kinematic bicycle fitted to CARLA's Lincoln."""
+"""How an ego moves under throttle, brake and steering: a bicycle fitted to CARLA's Lincoln."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import NamedTuple
 
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
-from di_envs.town.lanes import LaneKind
-from di_envs.town.queries import lanes_below_box, nearest_lane
-from di_envs.world.state import HISTORY_LENGTH, OCCUPIED_LANES, TICK_S
+from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
+from di_envs.world.state import HISTORY_LENGTH, TICK_S
 
-DRIVING = int(LaneKind.DRIVING)
+LOOK_M = 40.0  # for a lane; an ego this far from all of them has left its route too
 
 
 class EgoParameters(NamedTuple):
@@ -119,3 +118,28 @@ def move_ego(state, ego, model):
     state.yaw_rate[ego] = yaw_rate
     state.brake_light[ego] = 1 if brake > 0.0 else 0
     state.speed_history[ego, state.tick[()] % HISTORY_LENGTH] = next_speed
+
+
+@kernel
+def locate_ego(state, lanes, ego):
+    """Finds the lanes below an ego, and its height from the nearest one; none beyond 40 m.
+
+    Lanes more than 2.5 m above or below it do not count, so a bridge is not the road below.
+    """
+    x, y, z = state.x[ego], state.y[ego], state.z[ego]
+    lane, station, lateral, _distance = nearest_lane(lanes, x, y, z, LOOK_M, DRIVING_MASK)
+    state.lane[ego] = lane
+    state.lane_m[ego] = station
+    state.lateral_m[ego] = lateral
+    if lane >= 0:
+        state.z[ego] = pose_at(lanes, lane, station)[2]
+    lanes_below_box(
+        lanes,
+        x,
+        y,
+        state.z[ego],
+        state.yaw[ego],
+        state.half_length[ego],
+        state.half_width[ego],
+        state.occupied[ego],
+    )

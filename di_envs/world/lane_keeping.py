@@ -7,7 +7,7 @@ import math
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LaneKind
-from di_envs.town.queries import nearest_lane, pose_at
+from di_envs.town.queries import nearest_lane, pose_at, width_at
 from di_envs.world.event_rows import record
 from di_envs.world.progress import is_past
 from di_envs.world.state import EventKind
@@ -16,14 +16,9 @@ ALLOWED_OUT_M = 1.3  # beyond the lane's edge, for the ego's centre
 AGAINST_LANE = math.cos(math.radians(120.0))  # leaving a junction this far off the lane's direction
 LANE_JUMP = math.cos(math.radians(150.0))  # between two ticks' lanes: into or out of the wrong one
 WINDOW = 3  # route points looked at beyond the present one
-PARKING = int(LaneKind.PARKING)
+PARKING_LOOK_M = 10.0  # for a parking lane; further away none can help
+PARKING_MASK = 1 << int(LaneKind.PARKING)
 OUTSIDE_LANES = int(EventKind.OUTSIDE_LANES)
-
-
-@kernel
-def _width_at(lanes, lane, station):
-    step = int(round(station / lanes.spacing_m[lane]))
-    return lanes.width_m[lanes.first[lane] + min(max(step, 0), lanes.count[lane] - 1)]
 
 
 @kernel
@@ -39,16 +34,15 @@ def is_outside_lanes(state, lanes, ego):
     lane, station = state.lane[ego], state.lane_m[ego]
     width, distance = 0.0, math.inf
     if lane >= 0:
-        width = _width_at(lanes, lane, station)
+        width = width_at(lanes, lane, station)
         distance = _distance_to(state, lanes, ego, lane, station)
     if distance <= 0.5 * width:  # on its lane: no parking lane could make that an infraction
         return False
-    found = nearest_lane(lanes, state.x[ego], state.y[ego], state.z[ego], PARKING)
-    if found[0] >= 0:
-        parking_distance = _distance_to(state, lanes, ego, found[0], found[1])
-        if parking_distance <= distance:
-            width = _width_at(lanes, found[0], found[1])
-            distance = parking_distance
+    parking, at, _lateral, away = nearest_lane(
+        lanes, state.x[ego], state.y[ego], state.z[ego], PARKING_LOOK_M, PARKING_MASK
+    )
+    if parking >= 0 and away <= distance:
+        distance, width = away, width_at(lanes, parking, at)
     return distance > 0.5 * width + ALLOWED_OUT_M
 
 

@@ -1,5 +1,5 @@
 # mypy: disallow_untyped_defs=False
-"""How far along its route an ego has come, by the rule of Leaderboard 1.0's route completion test."""
+"""How far along its route an ego has come, by Leaderboard 1.0's route completion test."""
 
 from __future__ import annotations
 

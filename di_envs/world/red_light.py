@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 
 from di_envs.kernels import kernel
-from di_envs.town.lanes import LaneKind, LightState, SignalKind
-from di_envs.town.queries import nearest_lane
+from di_envs.town.lanes import LightState, SignalKind
+from di_envs.town.queries import DRIVING_MASK, nearest_lane
 from di_envs.world.event_rows import record
 from di_envs.world.state import EventKind
 
@@ -15,8 +15,9 @@ WITHIN_M = 15.0  # of the ego the centre of the light's trigger box must be
 TAIL_FROM = 0.8  # half lengths behind the centre at which the tail begins …
 TAIL_BEYOND_M = 1.0  # … and metres behind the bumper at which it ends
 LINE_HALF_WIDTHS = 0.4  # of the lane's width, to either side: yes, less than the lane
+TAIL_LOOK_M = 10.0  # for the lane below the tail
 
-DRIVING, LIGHT, RED = int(LaneKind.DRIVING), int(SignalKind.LIGHT), int(LightState.RED)
+LIGHT, RED = int(SignalKind.LIGHT), int(LightState.RED)
 RED_LIGHT = int(EventKind.RED_LIGHT)
 
 
@@ -66,7 +67,7 @@ def _tail_crosses(state, lanes, signals, ego, line):
         near_x, near_y, far_x, far_y, x - side_x, y - side_y, x + side_x, y + side_y
     ):
         return False
-    tail = nearest_lane(lanes, far_x, far_y, state.z[ego], DRIVING)[0]
+    tail = nearest_lane(lanes, far_x, far_y, state.z[ego], TAIL_LOOK_M, DRIVING_MASK)[0]
     stop = signals.stop_lane[line]
     same_road = tail >= 0 and lanes.road[tail] == lanes.road[stop]
     return same_road and lanes.lane_id[tail] == lanes.lane_id[stop]

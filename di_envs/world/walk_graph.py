@@ -7,7 +7,7 @@ joined where their ends meet. A crosswalk's line runs from sidewalk to sidewalk.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,9 @@ Line = NDArray[np.float64]  # (N, 3) x, y, z
 class WalkGraph(NamedTuple):
     """Arrays over edges E, their points P, links N, crosswalks X, approaches V and lights T."""
 
-    # (E,) edges: points [first, first + count) at even spacing
+    # (E,) edges: points [first, first + size) at even spacing
     first: NDArray[np.int32]
-    count: NDArray[np.int32]
+    size: NDArray[np.int32]  # number of points
     length_m: NDArray[np.float64]
     spacing_m: NDArray[np.float64]
     side_m: NDArray[np.float64]  # that walkers keep to the right of the line
@@ -78,12 +78,12 @@ def build_walk_graph(town: Town) -> WalkGraph:
     edges += _links(lanes, [edge.line for edge in edges])
     edges += _crossings(lanes, crosswalks, pieces, ends)
     return WalkGraph(
-        *_edge_arrays(edges),
-        *_next_edges([edge.line for edge in edges]),
-        _points_of(edges),
-        _strips(crosswalks),
-        *_lights(lanes, crosswalks, town.signals),
-        *_approaches(lanes, crosswalks),
+        **_edge_arrays(edges),
+        **_next_edges([edge.line for edge in edges]),
+        points=_points_of(edges),
+        strip=_strips(crosswalks),
+        **_lights(lanes, crosswalks, town.signals),
+        **_approaches(lanes, crosswalks),
     )
 
 
@@ -198,22 +198,22 @@ def _resample(line: Line) -> Line:
     return np.stack([np.interp(even, station, line[:, k]) for k in range(3)], axis=1)
 
 
-def _edge_arrays(edges: list[_Edge]) -> tuple[NDArray[np.generic], ...]:
+def _edge_arrays(edges: list[_Edge]) -> dict[str, Any]:
     count = np.array([len(edge.line) for edge in edges], np.int32)
     length = np.array([_length(edge.line) for edge in edges])
-    return (
-        (np.cumsum(count) - count).astype(np.int32),
-        count,
-        length,
-        length / np.maximum(count - 1, 1),
-        np.array([edge.side_m for edge in edges], np.float64),
-        np.array([edge.crosswalk for edge in edges], np.int32),
-        np.array([edge.road[0] for edge in edges], np.float64),
-        np.array([edge.road[1] for edge in edges], np.float64),
-    )
+    return {
+        "first": (np.cumsum(count) - count).astype(np.int32),
+        "size": count,
+        "length_m": length,
+        "spacing_m": length / np.maximum(count - 1, 1),
+        "side_m": np.array([edge.side_m for edge in edges], np.float64),
+        "crosswalk": np.array([edge.crosswalk for edge in edges], np.int32),
+        "road_begin_m": np.array([edge.road[0] for edge in edges], np.float64),
+        "road_end_m": np.array([edge.road[1] for edge in edges], np.float64),
+    }
 
 
-def _next_edges(lines: list[Line]) -> tuple[NDArray[np.generic], ...]:
+def _next_edges(lines: list[Line]) -> dict[str, Any]:
     """Which edges begin or end where an edge begins or ends."""
     ends = np.array([line[k] for line in lines for k in (0, -1)]).reshape(-1, 3)
     starts, edges, directions = [0], [], []
@@ -223,11 +223,11 @@ def _next_edges(lines: list[Line]) -> tuple[NDArray[np.generic], ...]:
         edges += list(others // 2)
         directions += list(1 - 2 * (others % 2))
         starts.append(len(edges))
-    return (
-        np.array(starts, np.int32),
-        np.array(edges, np.int32),
-        np.array(directions, np.int8),
-    )
+    return {
+        "next_start": np.array(starts, np.int32),
+        "next_edge": np.array(edges, np.int32),
+        "next_direction": np.array(directions, np.int8),
+    }
 
 
 def _points_of(edges: list[_Edge]) -> NDArray[np.float64]:
@@ -251,9 +251,7 @@ def _strips(crosswalks: Crosswalks) -> NDArray[np.float64]:
     )
 
 
-def _lights(
-    lanes: Lanes, crosswalks: Crosswalks, signals: Signals
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _lights(lanes: Lanes, crosswalks: Crosswalks, signals: Signals) -> dict[str, Any]:
     """The lights at the stop lines before which, or shortly after which, a crosswalk lies."""
     starts, lights = [0], []
     for crosswalk in range(crosswalks.width_m.size):
@@ -275,14 +273,14 @@ def _lights(
             found |= {head for head in heads if signals.kind[head] == SignalKind.LIGHT}
         lights += sorted(found)
         starts.append(len(lights))
-    return np.array(starts, np.int32), np.array(lights, np.int32)
+    return {"light_start": np.array(starts, np.int32), "light": np.array(lights, np.int32)}
 
 
 def _linked(start: NDArray[np.int32], links: NDArray[np.int32], lane: int) -> list[int]:
     return [int(other) for other in links[start[lane] : start[lane + 1]]]
 
 
-def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> tuple[NDArray[np.generic], ...]:
+def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> dict[str, Any]:
     """For each lane the crosswalks ahead, found by walking back from them."""
     rows: list[list[tuple[int, int, float, float]]] = [[] for _ in range(lanes.kind.size)]
     for crosswalk in range(crosswalks.width_m.size):
@@ -301,10 +299,10 @@ def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> tuple[NDArray[np.generi
                         begin[before] = begin[lane] + float(lanes.length_m[before])
                         front.append(before)
     flat = [row for own in rows for row in own]
-    return (
-        np.cumsum([0, *(len(own) for own in rows)]).astype(np.int32),
-        np.array([row[0] for row in flat], np.int32),
-        np.array([row[1] for row in flat], np.int32),
-        np.array([row[2] for row in flat], np.float64),
-        np.array([row[3] for row in flat], np.float64),
-    )
+    return {
+        "approach_start": np.cumsum([0, *(len(own) for own in rows)]).astype(np.int32),
+        "approach": np.array([row[0] for row in flat], np.int32),
+        "approach_lane": np.array([row[1] for row in flat], np.int32),
+        "approach_begin_m": np.array([row[2] for row in flat], np.float64),
+        "approach_end_m": np.array([row[3] for row in flat], np.float64),
+    }

@@ -65,7 +65,7 @@ def _place_target(state, walk, walker):
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     spacing = walk.spacing_m[edge]
     step = state.walk_m[walker] / spacing
-    k = min(max(int(step), 0), walk.count[edge] - 2)
+    k = min(max(int(step), 0), walk.size[edge] - 2)
     a, b, part = walk.points[walk.first[edge] + k], walk.points[walk.first[edge] + k + 1], step - k
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = max(math.hypot(dx, dy), 1e-9)
