@@ -94,9 +94,10 @@ class RouteEnvConfig:
 
     def __post_init__(self) -> None:
         self._freeze_names()
-        if self.suite is None and self.routes is None:
+        if self.suite is None and (self.town is None or self.routes is None):
             raise ValueError(
-                "A RouteEnv needs routes: give suite=NAME, or town=FILE and routes=FILE."
+                f"A RouteEnv needs suite=NAME, or both town=FILE and routes=FILE; got "
+                f"suite={self.suite!r}, town={self.town!r}, routes={self.routes!r}."
             )
         self._check_names()
         for field in ("traffic", "walkers"):

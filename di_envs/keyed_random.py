@@ -29,6 +29,7 @@ class Stream(IntEnum):
     GNSS = 9
     AGENT = 10
     WEATHER = 11
+    ROUTE = 12
 
 
 @kernel
@@ -51,7 +52,9 @@ def keyed_hash(seed, stream, tick, actor):
 @kernel
 def uniform(seed, stream, tick, actor):
     """A number in [0, 1), a function of its four integer keys alone."""
-    return float(keyed_hash(seed, stream, tick, actor) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+    return float(keyed_hash(seed, stream, tick, actor) >> np.uint64(11)) * (
+        1.0 / 9007199254740992.0
+    )
 
 
 @kernel

@@ -103,7 +103,7 @@ def scene_of(state: State) -> Scene:
 
 
 def stop_lines_of(signals: Signals) -> StopLines:
-    """The stop lines of a town's signals. Copied, as read-only arrays would compile kernels anew."""
+    """A town's stop lines. Copied, as read-only arrays would compile the kernels anew."""
     kind = signals.kind[signals.stop_signal].astype(np.int8)
     return StopLines(signals.stop_pose.copy(), signals.stop_signal.copy(), kind)
 

@@ -1,9 +1,10 @@
 """The reward: how much the driving score, in metres, grew in a step, as named terms.
 
 Score in metres = route metres done x (1 - share of them outside the lanes) x penalty of each
-infraction so far. A step's reward is its growth, so an episode's return is `route length x driving score / 100`:
-what the Leaderboard counts is what is learned. The terms add up to the reward exactly as written:
-progress first, then metres outside, both at the penalty before the step, then each infraction.
+infraction so far. A step's reward is its growth, so an episode's return is its driving score in
+metres, `route length x driving score / 100`: what the Leaderboard counts is what is learned. The
+terms add up to the reward as follows: progress first, then metres outside, both at the penalty
+before the step, then each infraction.
 """
 
 from __future__ import annotations

@@ -1,0 +1,238 @@
+"""`RouteEnv`: one ego drives one route of a suite, as a Gymnasium environment."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from di_envs.actions import action_space, checked_action
+from di_envs.config import RouteEnvConfig, check_name
+from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.observation import Observer, observation_space
+from di_envs.reward import (
+    PENALTIES,
+    Standing,
+    infraction_penalty,
+    reward_terms,
+    score_metres,
+    standing_of,
+)
+from di_envs.suites import choose_suite
+from di_envs.town.loading import load_town
+from di_envs.town.plan import RoutePlan
+from di_envs.world.state import TICK_S, EventKind
+from di_envs.world.world import Event, Snapshot, World, WorldConfig, WorldView
+
+Observation = dict[str, Any]
+Info = dict[str, Any]
+
+_RESET_OPTIONS = ("route",)
+_EGO = 0
+_SEEDS = 2**32  # of episodes that are reset without a seed
+_SEED_LIMIT = 2**63
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteEnvSnapshot:
+    """What `RouteEnv.save_state` returns: everything that a step or a reset depends on."""
+
+    world: Snapshot | None  # None before the first reset
+    over: bool
+    np_random: Mapping[str, Any]
+    np_random_seed: int
+
+
+class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
+    """Drives one route an episode, among traffic and walkers, by the Leaderboard's rules.
+
+    An episode terminates when the route is completed, when the ego has left it or is blocked, and
+    at the events in `terminate_on`; it is truncated by the route's timeout. The reward is the
+    growth of the driving score in metres (`di_envs.reward`). `info` holds:
+
+    - `route_id`, and `route_completion` [percent], `infraction_penalty` (0..1, without the metres
+      outside lanes) and `driving_score` (0..100) so far;
+    - `game_time_s` since the episode began;
+    - `reward_terms`: the named terms that add up to the reward;
+    - `events`: the step's `Event`s, a tuple;
+    - `finished`: name of the event that ended the route by the rules, empty while it goes on.
+
+    Attributes:
+        config: The options, with the suite's values in place of None.
+        world: The world below, for whoever may look behind the scenes.
+        plans: The routes that there are to drive, in the order of `route_ids`.
+    """
+
+    metadata = {"render_modes": [], "render_fps": 20}  # noqa: RUF012 (Gymnasium's own contract)
+
+    def __init__(self, *, render_mode: None = None, **options: Any) -> None:
+        """Loads the town and plans the routes.
+
+        Args:
+            render_mode: None; there is no renderer yet.
+            options: See `RouteEnvConfig`.
+
+        Raises:
+            ValueError: If an option is unknown or refused, or a route cannot be planned.
+            FileNotFoundError: If there is no such town.
+        """
+        if render_mode is not None:
+            raise ValueError(f"RouteEnv has no render mode yet; got render_mode={render_mode!r}.")
+        config = RouteEnvConfig.from_mapping(options)
+        suite = choose_suite(
+            config.suite, town=config.town, routes=config.routes, signals=config.signals
+        )
+        self.config = dataclasses.replace(
+            config,
+            traffic=suite.traffic.vehicles if config.traffic is None else config.traffic,
+            walkers=suite.traffic.walkers if config.walkers is None else config.walkers,
+            weather=config.weather or suite.weather,
+        )
+        town = load_town(suite.town_path, suite.signals)
+        self.plans = suite.plans(town, config.route_ids)
+        self.world = World(
+            town, WorldConfig(vehicles=self.config.traffic, walkers=self.config.walkers)
+        )
+        self.observation_space = observation_space(config.observations)
+        self.action_space = action_space()
+        self._observer = Observer(town, config.observations, _EGO)
+        self._penalties = PENALTIES[config.rules]
+        self._stops = tuple(EventKind[name.upper()] for name in config.terminate_on)
+        self._begun = False
+        self._over = True
+
+    @property
+    def route_ids(self) -> tuple[str, ...]:
+        """Ids of the routes, by index."""
+        return tuple(plan.route_id for plan in self.plans)
+
+    @property
+    def view(self) -> WorldView:
+        """The present state, read-only, for privileged agents. RuntimeError before a reset."""
+        return self.world.view
+
+    @property
+    def plan(self) -> RoutePlan:
+        """The route being driven. RuntimeError before a reset."""
+        return self.view.plans[_EGO]
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Observation, Info]:
+        """Starts an episode.
+
+        Args:
+            seed: Of the world and of the choice of a route: 0 or more. Equal seeds and routes give
+                equal episodes, bit for bit, whatever came before. Without one, the next seed of
+                the sequence that the last seed began.
+            options: `route`: a route's id (a string) or its index in `route_ids` (an integer);
+                without it the seed draws one.
+
+        Raises:
+            ValueError: If the seed is too large, or an option or the route is unknown.
+        """
+        if seed is not None and seed >= _SEED_LIMIT:
+            raise ValueError(f"A seed is a whole number from 0 to 2**63 - 1; got {seed}.")
+        super().reset(seed=seed)
+        world_seed = int(self.np_random.integers(_SEEDS)) if seed is None else int(seed)
+        index = self._route_index(dict(options or {}), world_seed)
+        self.world.reset(world_seed, [self.plans[index]])
+        self._begun, self._over = True, False
+        self._observer.start(self.view)
+        standing = standing_of(self.view.state, _EGO)
+        return self._observer.observe(), self._info(standing, standing, ())
+
+    def step(self, action: np.ndarray[Any, Any]) -> tuple[Observation, float, bool, bool, Info]:
+        """Holds an action for `control_dt_s`.
+
+        Args:
+            action: (3,) throttle 0..1, steer -1..1 (positive is right), brake 0..1.
+
+        Raises:
+            ValueError: If the action is not in the action space.
+            gymnasium.error.ResetNeeded: Before the first reset, and after an episode's end.
+        """
+        control = checked_action(action)
+        if self._over:
+            raise gymnasium.error.ResetNeeded(
+                "There is no episode to step: it is over, or none was begun. Call reset() first."
+            )
+        state = self.view.state
+        before = standing_of(state, _EGO)
+        events = tuple(self.world.advance(control[None], self.config.control_ticks))
+        after = standing_of(state, _EGO)
+        terminated, truncated = self._ending(before, after)
+        self._over = terminated or truncated
+        info = self._info(before, after, events)
+        reward = sum(info["reward_terms"].values())
+        return self._observer.observe(), reward, terminated, truncated, info
+
+    def observe(self) -> Observation:
+        """The present observation once more: after `restore`, for instance. Changes nothing."""
+        self.view  # noqa: B018 (raises before the first reset)
+        return self._observer.observe()
+
+    def save_state(self) -> RouteEnvSnapshot:
+        """A value from which `restore_state` brings everything back. See `di_envs.save`."""
+        return RouteEnvSnapshot(
+            world=self.world.save() if self._begun else None,
+            over=self._over,
+            np_random=self.np_random.bit_generator.state,
+            np_random_seed=self.np_random_seed,
+        )
+
+    def restore_state(self, snapshot: RouteEnvSnapshot) -> None:
+        """Puts back what `save_state` returned, of this environment or of one made like it.
+
+        Raises:
+            ValueError: If the snapshot is of another town or of other numbers of actors.
+        """
+        if snapshot.world is not None:
+            self.world.restore(snapshot.world)
+            self._observer.start(self.view)
+        self._begun, self._over = snapshot.world is not None, snapshot.over
+        self.np_random.bit_generator.state = dict(snapshot.np_random)
+        self._np_random_seed = snapshot.np_random_seed
+
+    def _route_index(self, options: dict[str, Any], world_seed: int) -> int:
+        for option in options:
+            check_name(option, _RESET_OPTIONS, "reset option")
+        route, count = options.get("route"), len(self.plans)
+        if route is None:
+            return int(keyed_hash(world_seed, int(Stream.ROUTE), 0, 0)) % count
+        if isinstance(route, str):
+            check_name(route, self.route_ids, "route id")
+            return self.route_ids.index(route)
+        if isinstance(route, bool) or not isinstance(route, int | np.integer):
+            raise ValueError(f"options['route'] is an id (str) or an index (int); got {route!r}.")
+        if not 0 <= route < count:
+            raise ValueError(
+                f"Route index {route} is not in 0..{count - 1}; for the route whose id is {route} "
+                f"give the string '{route}'. Ids: {', '.join(self.route_ids)}."
+            )
+        return int(route)
+
+    def _ending(self, before: Standing, after: Standing) -> tuple[bool, bool]:
+        """Whether the episode is terminated, and whether it is truncated."""
+        finished = int(self.view.state.finished[_EGO])
+        stopped = any(after.counts[kind] > before.counts[kind] for kind in self._stops)
+        truncated = finished == EventKind.TIMEOUT
+        return stopped or (finished != 0 and not truncated), truncated
+
+    def _info(self, before: Standing, after: Standing, events: tuple[Event, ...]) -> Info:
+        state, plan = self.view.state, self.plan
+        finished = int(state.finished[_EGO])
+        return {
+            "route_id": plan.route_id,
+            "route_completion": 100.0 * after.done_m / plan.length_m,
+            "infraction_penalty": infraction_penalty(after, self._penalties),
+            "driving_score": 100.0 * score_metres(after, self._penalties) / plan.length_m,
+            "game_time_s": int(state.tick) * TICK_S,
+            "reward_terms": reward_terms(before, after, self._penalties),
+            "events": events,
+            "finished": EventKind(finished).name.lower() if finished else "",
+        }
