@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.markup import escape
 
 if TYPE_CHECKING:
+    from di_envs.suites import Suite
     from leaderboard.record import RunRecord
 
 EXIT_USAGE = 2
@@ -164,9 +165,8 @@ def _complain(message: str) -> None:
 def _evaluate(command: Evaluate) -> int:
     if command.seeds < 1 or command.workers < 1:
         raise UsageError("--seeds and --workers must be at least 1")
-    options = _environment_options(command)
-    name = command.suite if command.suite and not command.routes else Path(str(command.routes)).stem
-    folder = command.output or _new_folder(f"{_plain(command.agent)}-{_plain(name)}")
+    options, suite = _choose(command)
+    folder = command.output or _new_folder(f"{_plain(command.agent)}-{_plain(suite.name)}")
 
     from leaderboard.results import ResultsError, prepare_folder
 
@@ -182,7 +182,7 @@ def _evaluate(command: Evaluate) -> int:
     spec = RunSpec(agent=command.agent, options=options, rules=command.rules)
     try:
         run = evaluate(
-            spec, range(command.seeds), suite=name, folder=folder, workers=command.workers
+            spec, range(command.seeds), suite=suite, folder=folder, workers=command.workers
         )
     except (SetupError, ResultsError) as error:
         _remove_if_empty(folder)
@@ -191,9 +191,10 @@ def _evaluate(command: Evaluate) -> int:
     return 0 if run.complete else EXIT_INTERRUPTED
 
 
-def _environment_options(command: Evaluate) -> dict[str, Any]:
-    """The options that were given, checked as far as that goes without loading a town."""
+def _choose(command: Evaluate) -> tuple[dict[str, Any], Suite]:
+    """The environment's options and the suite, checked as far as goes without loading a town."""
     from di_envs.config import RouteEnvConfig
+    from di_envs.suites import choose_suite
 
     names = ("suite", "town", "routes", "signals", "traffic", "walkers", "rules")
     given = {name: getattr(command, name) for name in names}
@@ -202,9 +203,13 @@ def _environment_options(command: Evaluate) -> dict[str, Any]:
         options["route_ids"] = command.route_ids
     try:
         RouteEnvConfig.from_mapping(options)
-    except ValueError as error:
+        suite = choose_suite(
+            command.suite, town=command.town, routes=command.routes, signals=command.signals
+        )
+        suite.specs(route_ids=command.route_ids or None)
+    except (ValueError, OSError) as error:
         raise UsageError(str(error)) from error
-    return options
+    return options, suite
 
 
 def _plain(name: str) -> str:

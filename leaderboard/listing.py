@@ -6,6 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from agents import AGENTS, load_agent
+from di_envs.suites import load_suite, suite_names
 
 
 def agent_table() -> Table:
@@ -28,3 +29,24 @@ def _track(name: str) -> str:
         return str(agent.requires.track)
     finally:
         agent.close()
+
+
+def suite_table() -> Table:
+    """The shipped suites, with how many routes they hold and who else is on the road."""
+    table = Table(title="suites", title_justify="left", title_style="bold")
+    for column in ("name", "version", "town", "routes", "vehicles", "walkers", "what it is"):
+        table.add_column(column, justify="right" if column in _NUMBERS else "left")
+    for suite in map(load_suite, suite_names()):
+        table.add_row(
+            suite.name,
+            str(suite.version),
+            suite.town,
+            str(len(suite.specs())),
+            str(suite.traffic.vehicles),
+            str(suite.traffic.walkers),
+            escape(suite.description),
+        )
+    return table
+
+
+_NUMBERS = ("version", "routes", "vehicles", "walkers")

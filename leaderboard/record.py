@@ -98,6 +98,7 @@ class RunRecord:
     """A run of one agent over routes and seeds, finished or not.
 
     Attributes:
+        suite_version: 0 for routes of the user's own.
         options: Environment options that differ from the defaults.
         versions: Package name to version, for all that can change bits.
         cpu: CPU capability that the kernels were compiled for.
@@ -110,6 +111,7 @@ class RunRecord:
     track: str
     requires: Mapping[str, Any]
     suite: str
+    suite_version: int
     options: Mapping[str, Any]
     town: str
     town_hash: str

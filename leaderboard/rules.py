@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from di_envs.reward import PENALTIES
 from di_envs.world.state import EventKind
 
 
@@ -41,15 +42,7 @@ class Rules:
 
 CARLA_1_0 = Rules(
     name="carla-1.0",
-    factors=MappingProxyType(
-        {
-            EventKind.COLLISION_WALKER: 0.50,
-            EventKind.COLLISION_VEHICLE: 0.60,
-            EventKind.COLLISION_STATIC: 0.65,
-            EventKind.RED_LIGHT: 0.70,
-            EventKind.STOP_SIGN: 0.80,
-        }
-    ),
+    factors=PENALTIES["carla-1.0"],
     proportional=frozenset({EventKind.OUTSIDE_LANES}),
     endings=MappingProxyType(
         {

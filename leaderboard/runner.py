@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from di_envs.kernels import cpu_capability
+from di_envs.suites import Suite
 from leaderboard.engines import Engine, PoolEngine, SerialEngine
 from leaderboard.jobs import Job, RunSpec, plan_jobs
 from leaderboard.record import RouteRecord, RunRecord
@@ -34,7 +35,7 @@ def evaluate(
     spec: RunSpec,
     seeds: Sequence[int],
     *,
-    suite: str,
+    suite: Suite,
     folder: Path,
     workers: int = 1,
     console: Console | None = None,
@@ -44,7 +45,7 @@ def evaluate(
     Args:
         spec: The agent, the environment's options and the rules.
         seeds: Each gives every route a world of its own; see `Job.world_seed`.
-        suite: What the results call the set of routes.
+        suite: The set of routes that the options name.
         folder: Where the files go; see `results.prepare_folder`.
         workers: Number of processes; 1 drives in this one.
         console: Where progress is shown.
@@ -96,7 +97,7 @@ def _driven(
             yield record
 
 
-def new_run(spec: RunSpec, jobs: Sequence[Job], suite: str, scene: Scene) -> RunRecord:
+def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> RunRecord:
     """A run of which nothing is driven yet."""
     requires = scene.requires
     return RunRecord(
@@ -109,7 +110,8 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: str, scene: Scene) -> Run
             "privileged": requires.privileged,
             "options": dict(requires.options),
         },
-        suite=suite,
+        suite=suite.name,
+        suite_version=suite.version,
         options={name: _as_json(value) for name, value in spec.options.items()},
         town=scene.town,
         town_hash=scene.town_hash,

@@ -77,6 +77,7 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
         "track": "PRIVILEGED",
         "requires": {"observations": ["prompt"]},
         "suite": "town05_long",
+        "suite_version": 1,
         "options": {"traffic": 3},
         "town": "town05",
         "town_hash": "ff",
