@@ -21,6 +21,7 @@ ANY_MASK = (1 << len(LaneKind)) - 1
 
 _DRIVING = int(LaneKind.DRIVING)
 _MOST_LANES_BELOW = 4
+_END_MARGIN_M = 0.25  # half the distance between two points
 _WIDEST_LANE_M = 8.0  # how far a box looks for lanes that reach below it
 
 
@@ -69,15 +70,18 @@ def _on_segment(points, i, x, y):
 
 
 @kernel
-def _project_near(lanes, lane, k, x, y):
-    """Projects onto the two segments beside a lane's point k: (s, lateral, squared distance)."""
-    first, last = lanes.first[lane], lanes.count[lane] - 2
+def _project_near(points, first, count, k, x, y):
+    """Projects onto the two segments beside a lane's point k: (points, lateral, square [m2]).
+
+    Takes arrays, not the whole network: that passes dozens of them, too slow for an inner loop.
+    """
+    last = count - 2
     best_k, best_f, best_lateral, best_square = 0, 0.0, 0.0, 1e30
     for j in range(max(k - 1, 0), min(k, last) + 1):
-        f, lateral, square = _on_segment(lanes.points, first + j, x, y)
+        f, lateral, square = _on_segment(points, first + j, x, y)
         if square < best_square:
             best_k, best_f, best_lateral, best_square = j, f, lateral, square
-    return (best_k + best_f) * lanes.spacing_m[lane], best_lateral, best_square
+    return best_k + best_f, best_lateral, best_square
 
 
 @kernel
@@ -109,8 +113,8 @@ def project_to_lane(lanes, lane, x, y, hint_m=-1.0):
                     break
                 best, best_square = k, square
                 k += step
-    s, lateral, _ = _project_near(lanes, lane, best, x, y)
-    return s, lateral
+    position, lateral, _ = _project_near(points, first, count, best, x, y)
+    return position * lanes.spacing_m[lane], lateral
 
 
 @kernel
@@ -119,7 +123,9 @@ def _search(lanes, x, y, z, yaw, aligned, max_distance_m, kind_mask):
 
     Looks at rings of cells around the point until no closer one can follow.
     """
-    cell = lanes.cell_m[0]
+    points, point_lane, kind = lanes.points, lanes.point_lane, lanes.kind
+    first, count, spacing = lanes.first, lanes.count, lanes.spacing_m
+    cell_start, cell_point, cell = lanes.cell_start, lanes.cell_point, lanes.cell_m[0]
     columns, rows = lanes.grid_size[0], lanes.grid_size[1]
     column = math.floor((x - lanes.grid_origin[0]) / cell)
     row = math.floor((y - lanes.grid_origin[1]) / cell)
@@ -133,25 +139,24 @@ def _search(lanes, x, y, z, yaw, aligned, max_distance_m, kind_mask):
             for i in range(column - ring, column + ring + 1, 1 if on_edge else max(2 * ring, 1)):
                 if i < 0 or i >= columns:
                     continue
-                flat = j * columns + i
-                for n in range(lanes.cell_start[flat], lanes.cell_start[flat + 1]):
-                    point = lanes.cell_point[n]
-                    lane = lanes.point_lane[point]
-                    if not (kind_mask >> lanes.kind[lane]) & 1:
+                for n in range(cell_start[j * columns + i], cell_start[j * columns + i + 1]):
+                    point = cell_point[n]
+                    lane = point_lane[point]
+                    if not (kind_mask >> kind[lane]) & 1 or abs(points[point, 2] - z) > LEVEL_M:
                         continue
-                    if abs(lanes.points[point, 2] - z) > LEVEL_M:
-                        continue
-                    dx, dy = lanes.points[point, 0] - x, lanes.points[point, 1] - y
-                    reach = best + 0.5 * lanes.spacing_m[lane] + 1e-9
+                    dx, dy = points[point, 0] - x, points[point, 1] - y
+                    reach = best + 0.5 * spacing[lane] + 1e-9
                     if dx * dx + dy * dy > reach * reach:
                         continue
-                    if aligned and math.cos(lanes.points[point, 3] - yaw) <= 0.0:
+                    if aligned and math.cos(points[point, 3] - yaw) <= 0.0:
                         continue
-                    k = point - lanes.first[lane]
-                    s, lateral, square = _project_near(lanes, lane, k, x, y)
+                    position, lateral, square = _project_near(
+                        points, first[lane], count[lane], point - first[lane], x, y
+                    )
                     distance = math.sqrt(square)
                     if distance < best or (distance == best and best_lane < 0):
-                        best_lane, best_s, best_lateral, best = lane, s, lateral, distance
+                        best_lane, best_lateral, best = lane, lateral, distance
+                        best_s = position * spacing[lane]
     return best_lane, best_s, best_lateral, best
 
 
@@ -189,58 +194,60 @@ def lanes_below_box(lanes, x, y, z, yaw, half_length, half_width, out):
         How many there are, at most 4.
     """
     nearest = np.full(_MOST_LANES_BELOW, 1e30)  # squared distances of those in `out`
-    for n in range(len(out)):
-        out[n] = -1
-    cell = lanes.cell_m[0]
+    out[:] = -1
+    points, point_lane, kind, width = lanes.points, lanes.point_lane, lanes.kind, lanes.width_m
+    first, lane_count, cell_start = lanes.first, lanes.count, lanes.cell_start
+    columns, cell = lanes.grid_size[0], lanes.cell_m[0]
     reach = math.hypot(half_length, half_width) + 0.5 * _WIDEST_LANE_M
     c, s = math.cos(yaw), math.sin(yaw)
-    low_i, high_i = _cells(x, reach, lanes.grid_origin[0], cell, lanes.grid_size[0])
+    low_i, high_i = _cells(x, reach, lanes.grid_origin[0], cell, columns)
     low_j, high_j = _cells(y, reach, lanes.grid_origin[1], cell, lanes.grid_size[1])
     for j in range(low_j, high_j):
-        for i in range(low_i, high_i):
-            flat = j * lanes.grid_size[0] + i
-            for n in range(lanes.cell_start[flat], lanes.cell_start[flat + 1]):
-                point = lanes.cell_point[n]
-                lane = lanes.point_lane[point]
-                if lanes.kind[lane] != _DRIVING or abs(lanes.points[point, 2] - z) > LEVEL_M:
-                    continue
-                dx, dy = lanes.points[point, 0] - x, lanes.points[point, 1] - y
-                square = dx * dx + dy * dy
-                if square > reach * reach:
-                    continue
-                ahead, right = c * dx + s * dy, c * dy - s * dx
-                if _touches(lanes, lane, point, ahead, right, yaw, half_length, half_width):
-                    _keep_nearest(out, nearest, lane, square)
-    count = 0
-    while count < _MOST_LANES_BELOW and out[count] >= 0:
-        count += 1
-    return count
+        for n in range(cell_start[j * columns + low_i], cell_start[j * columns + high_i]):
+            point = lanes.cell_point[n]
+            lane = point_lane[point]
+            dx, dy = points[point, 0] - x, points[point, 1] - y
+            square = dx * dx + dy * dy
+            if square > reach * reach or kind[lane] != _DRIVING:
+                continue
+            if abs(points[point, 2] - z) > LEVEL_M:
+                continue
+            k, turn = point - first[lane], points[point, 3] - yaw
+            end = -1 if k == 0 else (1 if k == lane_count[lane] - 1 else 0)
+            ahead, right = c * dx + s * dy, c * dy - s * dx
+            if _touches(ahead, right, turn, width[point], end, half_length, half_width):
+                _keep_nearest(out, nearest, lane, square)
+    found = 0
+    while found < _MOST_LANES_BELOW and out[found] >= 0:
+        found += 1
+    return found
 
 
 @kernel
 def _cells(centre, reach, origin, cell, size):
     """The range [low, high) of grid cells within reach along one axis."""
-    low = math.floor((centre - reach - origin) / cell)
-    high = math.floor((centre + reach - origin) / cell) + 1
-    return max(low, 0), min(high, size)
+    low = min(max(math.floor((centre - reach - origin) / cell), 0), size)
+    high = min(max(math.floor((centre + reach - origin) / cell) + 1, low), size)
+    return low, high
 
 
 @kernel
-def _touches(lanes, lane, point, ahead, right, yaw, half_length, half_width):
-    """Whether a lane's band at a point, given in the box's frame, reaches into the box."""
+def _touches(ahead, right, turn, width, end, half_length, half_width):
+    """Whether a lane's band at one of its points reaches into a box.
+
+    Args:
+        ahead, right: The point in the box's frame [m].
+        turn: The lane's yaw in the box's frame [rad].
+        width: The lane's width there [m].
+        end: -1 at the lane's first point, 1 at its last, 0 between.
+        half_length, half_width: The box's size [m].
+    """
     gap_x = min(max(ahead, -half_length), half_length) - ahead  # from the point to the box
     gap_y = min(max(right, -half_width), half_width) - right
-    half = 0.5 * lanes.width_m[point]
-    if gap_x * gap_x + gap_y * gap_y >= half * half:
+    if gap_x * gap_x + gap_y * gap_y >= 0.25 * width * width:
         return False
-    # A lane ends at its ends: a box before or behind them is not on it.
-    k = point - lanes.first[lane]
-    if k == 0 or k == lanes.count[lane] - 1:
-        turn = lanes.points[point, 3] - yaw
-        along = gap_x * math.cos(turn) + gap_y * math.sin(turn)
-        if (k == 0 and along < -0.25) or (k > 0 and along > 0.25):
-            return False
-    return True
+    # A lane ends at its ends: a box behind or before them is not on it.
+    return end * (gap_x * math.cos(turn) + gap_y * math.sin(turn)) <= _END_MARGIN_M
 
 
 @kernel
