@@ -1,9 +1,9 @@
 """The planning graph over a town's driving lanes, laid out as CARLA's global planner lays it out.
 
-A node is where lanes begin, rounded to whole metres; an edge runs along one lane to the beginning
-of the next (its points 1 m apart along the road's reference line) or, at no cost, to the beginning
-of the lane beside it. The rounding and the free lane changes are CARLA's, and decide which of two
-similar ways round a block is taken, so they are kept.
+A node is where pieces of lanes begin, rounded to whole metres; an edge runs along one piece to the
+beginning of the next (its points 1 m apart along the road's reference line) or, at no cost, to the
+beginning of the piece beside it. The rounding and the free lane changes are CARLA's, and decide
+which of two similar ways round a block is taken, so they are kept.
 
 Source: behaviour of `agents/navigation/global_route_planner.py` in the CARLA Python API (Computer
 Vision Center, MIT licence), versions 0.9.9 to 0.9.16; the code here is ours.
@@ -20,32 +20,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import LaneKind, Lanes
+from di_envs.town.pieces import Piece, cut_lanes
 from di_envs.town.plan import RoadOption
 from di_envs.town.snapping import Chords, Snap, lay_chords, snap_to_lane
 from di_envs.town.town import Town
 from di_envs.town.traces import (
+    Ruler,
     Trace,
     join_traces,
-    place_on_lane,
+    lay_ruler,
+    places_by_road,
     successors_of,
     walk_beyond,
-    walk_lane,
 )
 
 STEP_M = 1.0  # between route points, along the road's reference line
 
-_TABLE_SIZES = (13, 29, 59, 127, 257, 541, 1109, 2357, 5087, 10273, 20753, 42043)  # libstdc++'s
 _CHANGE_LEFT, _CHANGE_RIGHT = 1, 2  # bits of Lanes.change
 
 
 class Edge(NamedTuple):
-    """A way from one node to another: along a lane, or to the lane beside it."""
+    """A way from one node to another: along a piece of lane, or to the piece beside it."""
 
     source: int
     target: int
-    option: RoadOption  # LANEFOLLOW along a lane, else the lane change
-    lane: int  # the lane followed, or left
-    exit_lane: int  # the lane entered at the end; the same one at a dead end
+    option: RoadOption  # LANEFOLLOW along a piece, else the lane change
+    piece: int  # the piece followed, or left
+    exit_piece: int  # the piece entered at the end; the same one at a dead end
+    lane: int  # that `piece` is a piece of
     cost: int  # number of steps
     in_junction: bool
     exit_direction: tuple[float, float]  # unit vector of the lane entered at the end
@@ -60,21 +62,18 @@ class RoadGraph:
     town: Town
     nodes: tuple[tuple[float, float, float], ...]  # rounded positions
     edges: tuple[dict[int, Edge], ...]  # by source node, then by target node, in order of insertion
-    lane_edge: dict[int, tuple[int, int]]  # by lane, the nodes of the edge that follows it
-    chords: Chords  # of the driving lanes, to put keypoints on them
+    piece_edge: dict[int, tuple[int, int]]  # by piece, the nodes of the edge that follows it
+    ruler: Ruler  # of the town's lanes
+    chords: Chords  # of the pieces, to put keypoints on them
 
-    def edge_of_lane(self, lane: int) -> Edge:
-        """The edge that follows a lane."""
-        source, target = self.lane_edge[lane]
+    def edge_of_piece(self, piece: int) -> Edge:
+        """The edge that follows a piece."""
+        source, target = self.piece_edge[piece]
         return self.edges[source][target]
 
     def snap(self, position: NDArray[np.float64]) -> Snap:
-        """Projects a point onto the driving lane nearest to it in three dimensions.
-
-        Args:
-            position: (3,) x, y, z.
-        """
-        return snap_to_lane(self.town.lanes, self.chords, position)
+        """Puts a point, (3,) x, y, z, on the driving lane nearest to it in three dimensions."""
+        return snap_to_lane(self.town.lanes, self.ruler, self.chords, position)
 
     def shortest_path(self, start: int, goal: int) -> list[int] | None:
         """Nodes from `start` to `goal`, or None where there is no way.
@@ -115,123 +114,131 @@ def build_road_graph(town: Town) -> RoadGraph:
     Raises:
         ValueError: If the town has no driving lanes.
     """
-    builder = _Builder(town.lanes)
-    driving = _driving_lanes(town)
-    if not driving:
+    if not np.any(town.lanes.kind == LaneKind.DRIVING):
         raise ValueError(
             f"Town '{town.name}' has no driving lanes, so nothing can be routed; "
             "check the lane types in its OpenDRIVE file."
         )
-    for lane in driving:
-        builder.follow(lane)
-    for lane in driving:
-        builder.change(lane)
+    pieces, ruler = cut_lanes(town), lay_ruler(town.lanes)
+    builder = _Builder(town.lanes, pieces, ruler)
+    for piece in range(len(pieces)):
+        builder.follow(piece)
+    for piece in range(len(pieces)):
+        builder.change(piece)
     return RoadGraph(
         town=town,
         nodes=tuple(builder.nodes),
         edges=tuple(builder.edges),
-        lane_edge=builder.lane_edge,
-        chords=lay_chords(town.lanes, driving),
+        piece_edge=builder.piece_edge,
+        ruler=ruler,
+        chords=lay_chords(town.lanes, ruler, pieces),
     )
 
 
 class _Builder:
     """The graph while it grows; the order of insertion is part of the result."""
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, lanes: Lanes, pieces: list[Piece], ruler: Ruler) -> None:
         self.lanes = lanes
+        self.pieces = pieces
+        self.ruler = ruler
+        self.steps = _steps_of(lanes, pieces, ruler)
         self.nodes: dict[tuple[float, float, float], int] = {}
         self.edges: list[dict[int, Edge]] = []
-        self.lane_edge: dict[int, tuple[int, int]] = {}
-        self.traces: dict[int, list[Trace]] = {}
+        self.piece_edge: dict[int, tuple[int, int]] = {}
+        self.between: dict[int, list[Trace]] = {}
+        self.by_section = {(piece.lane, piece.section): i for i, piece in enumerate(pieces)}
+        self.first_of_lane = {
+            piece.lane: i for i, piece in enumerate(pieces) if piece.begin_m == 0.0
+        }
+        self.next_in_lane = {(piece.lane, piece.begin_m): i for i, piece in enumerate(pieces)}
 
-    def node_at(self, position: NDArray[np.float64]) -> int:
-        x, y, z = np.round(position, 0) + 0.0  # -0.0 would be printed, not found
-        key = (float(x), float(y), float(z))
-        if key not in self.nodes:
-            self.nodes[key] = len(self.edges)
-            self.edges.append({})
-        return self.nodes[key]
+    def follow(self, index: int) -> None:
+        """Adds an edge along a piece to each of those ahead, or to its own end."""
+        along, ahead = self.steps[index], self._ahead(self.pieces[index])
+        for exit_piece in ahead:
+            self._add(index, exit_piece, along, self.steps[exit_piece].part(slice(0, 1)))
+        if not ahead and len(along.lane) > 2:
+            self._add(index, index, along, along.part(slice(-1, None)))
 
-    def follow(self, lane: int) -> None:
-        """Adds an edge along a lane to each of its successors, or to its own end."""
-        successors = successors_of(self.lanes, lane)
-        steps = walk_lane(self.lanes, lane, STEP_M)
-        begin = place_on_lane(self.lanes, lane, 0.0)
-        if not successors:
-            end = place_on_lane(self.lanes, lane, float(self.lanes.length_m[lane]))
-            self._add(lane, lane, begin, steps, end)
-        for successor in successors:
-            end = place_on_lane(self.lanes, successor, 0.0)
-            self._add(lane, successor, begin, steps, end)
+    def _ahead(self, piece: Piece) -> list[int]:
+        """The pieces that a piece leads into."""
+        following = self.next_in_lane.get((piece.lane, piece.end_m))
+        if following is not None:
+            return [following]
+        return [self.first_of_lane[lane] for lane in successors_of(self.lanes, piece.lane)]
 
-    def _add(self, lane: int, exit_lane: int, begin: Trace, steps: Trace, end: Trace) -> None:
-        middle = self._middle(lane, exit_lane, begin, steps, end)
-        if middle is None:
-            return
-        source, target = self.node_at(begin.points[0, :3]), self.node_at(end.points[0, :3])
-        self.lane_edge[lane] = (source, target)
-        self.traces.setdefault(lane, []).append(middle)
-        dx, dy = (end.points[0] - begin.points[0])[:2]
+    def _add(self, index: int, exit_piece: int, along: Trace, end: Trace) -> None:
+        piece, begin = self.pieces[index], along.part(slice(0, 1))
+        middle = self._middle(piece, along, end)
+        source, target = self._node_at(begin.points[0, :3]), self._node_at(end.points[0, :3])
+        self.piece_edge[index] = (source, target)
+        self.between.setdefault(index, []).append(middle)
+        dx, dy = (end.points[0] - begin.points[0])[:2].tolist()
         chord_m = math.hypot(dx, dy) or 1.0
         yaw = float(end.points[0, 3])
-        edge = Edge(
+        self.edges[source][target] = Edge(
             source=source,
             target=target,
             option=RoadOption.LANEFOLLOW,
-            lane=lane,
-            exit_lane=exit_lane,
+            piece=index,
+            exit_piece=exit_piece,
+            lane=piece.lane,
             cost=len(middle.lane) + 1,
-            in_junction=bool(self.lanes.junction[lane] >= 0),
+            in_junction=bool(self.lanes.junction[piece.lane] >= 0),
             exit_direction=(math.cos(yaw), math.sin(yaw)),
-            chord=(float(dx) / chord_m, float(dy) / chord_m),
+            chord=(dx / chord_m, dy / chord_m),
             trace=join_traces([begin, middle, end]),
         )
-        self.edges[source][target] = edge
 
-    def _middle(
-        self, lane: int, exit_lane: int, begin: Trace, steps: Trace, end: Trace
-    ) -> Trace | None:
+    def _middle(self, piece: Piece, along: Trace, end: Trace) -> Trace:
         """The points between: steps of 1 m until the end is at most 1 m away.
 
-        A lane shorter than a step gets one point all the same, beyond its end, as in CARLA.
+        A piece shorter than a step gets one point all the same, beyond its end, as in CARLA.
         """
-        goal = end.points[0, :3]
-        if np.linalg.norm(begin.points[0, :3] - goal) > STEP_M:
-            near = np.linalg.norm(steps.points[:, :3] - goal, axis=1) <= STEP_M
-            return steps.part(slice(0, int(np.argmax(near)) if near.any() else len(near)))
-        if len(steps.lane):
-            return steps.part(slice(0, 1))
-        if exit_lane == lane:
-            return None
-        return walk_beyond(self.lanes, lane, STEP_M)
+        away_m = np.linalg.norm(along.points[:-1, :3] - end.points[0, :3], axis=1)
+        if away_m[0] <= STEP_M:
+            lane, road_m = walk_beyond(self.lanes, piece.lane, piece.begin_m + STEP_M)
+            return places_by_road(
+                self.lanes, self.ruler, np.array([lane], np.int32), np.array([road_m])
+            )
+        near = np.flatnonzero(away_m <= STEP_M)
+        return along.part(slice(1, int(near[0]) if len(near) else len(away_m)))
 
-    def change(self, lane: int) -> None:
-        """Adds the lane changes that the lane's markings allow, in the order they come up."""
-        lanes = self.lanes
-        if lanes.junction[lane] >= 0:
+    def _node_at(self, position: NDArray[np.float64]) -> int:
+        x, y, z = (np.round(position, 0) + 0.0).tolist()  # + 0.0 makes one zero of -0.0 and 0.0
+        node = self.nodes.setdefault((x, y, z), len(self.edges))
+        if node == len(self.edges):
+            self.edges.append({})
+        return node
+
+    def change(self, index: int) -> None:
+        """Adds the lane changes that the piece's markings allow, in the order they come up."""
+        lanes, piece = self.lanes, self.pieces[index]
+        if lanes.junction[piece.lane] >= 0:
             return
-        for steps in self.traces.get(lane, []):
+        sides = (
+            (_CHANGE_RIGHT, RoadOption.CHANGELANERIGHT, int(lanes.right[piece.lane])),
+            (_CHANGE_LEFT, RoadOption.CHANGELANELEFT, int(lanes.left[piece.lane])),
+        )
+        for steps in self.between.get(index, []):
             found: set[RoadOption] = set()
-            for allowed in lanes.change[_point_at(lanes, lane, steps.lane_m)]:
-                for bit, option, beside in (
-                    (_CHANGE_RIGHT, RoadOption.CHANGELANERIGHT, int(lanes.right[lane])),
-                    (_CHANGE_LEFT, RoadOption.CHANGELANELEFT, int(lanes.left[lane])),
-                ):
-                    if allowed & bit and option not in found and beside in self.lane_edge:
+            for allowed in lanes.change[_points_at(lanes, steps)].tolist():
+                for bit, option, lane in sides:
+                    beside = self.by_section.get((lane, piece.section))
+                    if allowed & bit and option not in found and beside in self.piece_edge:
                         found.add(option)
-                        self._add_change(lane, beside, option)
-                if len(found) == 2:
-                    break
+                        self._add_change(index, beside, option)
 
-    def _add_change(self, lane: int, beside: int, option: RoadOption) -> None:
-        source, target = self.lane_edge[lane][0], self.lane_edge[beside][0]
+    def _add_change(self, index: int, beside: int, option: RoadOption) -> None:
+        source, target = self.piece_edge[index][0], self.piece_edge[beside][0]
         self.edges[source][target] = Edge(
             source=source,
             target=target,
             option=option,
-            lane=lane,
-            exit_lane=beside,
+            piece=index,
+            exit_piece=beside,
+            lane=self.pieces[index].lane,
             cost=0,
             in_junction=False,
             exit_direction=(0.0, 0.0),
@@ -240,40 +247,25 @@ class _Builder:
         )
 
 
-def _driving_lanes(town: Town) -> list[int]:
-    """Driving lanes in the order in which CARLA goes through them: it settles ties."""
-    lanes = town.lanes
-    rank = {road: i for i, road in enumerate(_carla_road_order(town.road_names))}
-    driving = [int(lane) for lane in np.flatnonzero(lanes.kind == LaneKind.DRIVING)]
-    return sorted(
-        driving,
-        key=lambda lane: (rank[int(lanes.road[lane])], lanes.section[lane], lanes.lane_id[lane]),
-    )
+def _steps_of(lanes: Lanes, pieces: list[Piece], ruler: Ruler) -> list[Trace]:
+    """Begin of each piece, its steps of 1 m, and its end."""
+    along = []
+    for piece in pieces:
+        span_m = piece.end_m - piece.begin_m
+        steps_m = np.arange(1.0, math.floor(span_m / STEP_M + 1e-9) + 1.0) * STEP_M
+        along.append(np.concatenate([[0.0], steps_m, [span_m]]) + piece.begin_m)
+    counts = [len(steps) for steps in along]
+    lane = np.repeat(np.array([piece.lane for piece in pieces], np.int32), counts)
+    places = places_by_road(lanes, ruler, lane, np.concatenate(along))
+    ends = np.cumsum(counts).tolist()
+    return [places.part(slice(a, b)) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
 
 
-def _carla_road_order(names: tuple[str, ...]) -> list[int]:
-    """Indices of roads in the order of CARLA's hash map of road ids.
-
-    CARLA keeps roads in a `std::unordered_map` by id. In GNU's library a new bucket goes to the
-    front of the list, as does a new id within its bucket, and all are laid anew when the table
-    grows. Files whose ids are not whole numbers keep their own order.
-    """
-    if not all(name.isdecimal() for name in names):
-        return list(range(len(names)))
-    order: list[int] = []
-    for size in _TABLE_SIZES:
-        buckets: dict[int, list[int]] = {}
-        for road in [*order, *range(len(order), min(size, len(names)))]:
-            buckets.setdefault(int(names[road]) % size, []).append(road)
-        order = [road for bucket in reversed(buckets.values()) for road in reversed(bucket)]
-        if len(order) == len(names):
-            break
-    return order
-
-
-def _point_at(lanes: Lanes, lane: int, lane_m: NDArray[np.float64]) -> NDArray[np.int64]:
-    nearest = np.rint(lane_m / lanes.spacing_m[lane]).astype(np.int64)
-    return lanes.first[lane] + np.clip(nearest, 0, lanes.count[lane] - 1)
+def _points_at(lanes: Lanes, places: Trace) -> NDArray[np.intp]:
+    """The lane points nearest to places."""
+    nearest = np.rint(places.lane_m / lanes.spacing_m[places.lane]).astype(np.intp)
+    first = lanes.first[places.lane].astype(np.intp)
+    return first + np.clip(nearest, 0, lanes.count[places.lane] - 1)
 
 
 def _walk_back(parents: dict[int, int], node: int) -> list[int]:

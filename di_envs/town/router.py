@@ -173,7 +173,7 @@ def _checked_snaps(
                 f"lane is {_text(snap.place.points[0])}: move the keypoint, or check that the "
                 "route was written for this town."
             )
-        if snap.lane not in graph.lane_edge:
+        if snap.piece not in graph.piece_edge:
             raise RouteError(
                 f"Route '{route_id}': keypoint {i} at {_text(places[i])} lies on a lane that leads "
                 "nowhere; move it to another lane."
@@ -183,14 +183,14 @@ def _checked_snaps(
 
 def _path_between(graph: RoadGraph, snaps: Sequence[Snap], leg: int, route_id: str) -> list[int]:
     start, end = snaps[leg], snaps[leg + 1]
-    path = graph.shortest_path(graph.lane_edge[start.lane][0], graph.lane_edge[end.lane][0])
+    path = graph.shortest_path(graph.piece_edge[start.piece][0], graph.piece_edge[end.piece][0])
     if path is None:
         raise RouteError(
             f"Route '{route_id}': no way leads from keypoint {leg} ({_lane_text(graph, start)}) to "
             f"keypoint {leg + 1} ({_lane_text(graph, end)}) in town '{graph.town.name}'; put the "
             "keypoints on lanes that are connected in the direction of travel."
         )
-    return [*path, graph.lane_edge[end.lane][1]]
+    return [*path, graph.piece_edge[end.piece][1]]
 
 
 def _trace_path(
@@ -215,25 +215,25 @@ def _trace_path(
         along = edge.trace.part(slice(_nearest(edge.trace, here), None))
         if i == len(edges) - 1:
             along = _cut_at_goal(edge, along, end, goal)
-        elif edges[i + 1].lane != edge.exit_lane:
-            along = _ending_on(along, edge, edges[i + 1].lane)
+        else:
+            along = _ending_on(along, edge, edges[i + 1])
         piece.add(along, option)
         here = along.part(slice(-1, None))
     return piece
 
 
-def _ending_on(along: Trace, edge: Edge, lane: int) -> Trace:
-    """Gives the last point, which begins several lanes at once, to the lane that is followed."""
-    if along.lane[-1] != edge.exit_lane or edge.exit_lane == edge.lane:
+def _ending_on(along: Trace, edge: Edge, following: Edge) -> Trace:
+    """Gives the last point, at which several lanes may begin, to the lane that is followed."""
+    if following.lane in (edge.lane, along.lane[-1]):
         return along
     owner = along.lane.copy()
-    owner[-1] = lane
+    owner[-1] = following.lane
     return along._replace(lane=owner)
 
 
 def _beyond_change(graph: RoadGraph, edge: Edge, here: Trace) -> Trace:
     """The place on the lane beside at which a lane change arrives."""
-    beside = graph.edge_of_lane(edge.exit_lane).trace
+    beside = graph.edge_of_piece(edge.exit_piece).trace
     between = beside.part(slice(1, -1))
     if not len(between.lane):
         return beside.part(slice(-1, None))
