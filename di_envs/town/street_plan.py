@@ -111,7 +111,8 @@ class StreetPlan:
     """The whole sketch."""
 
     name: str
-    latitude: float
+    about: str = ""  # where the figures come from
+    latitude: float  # of x = y = 0 [deg]
     longitude: float
     junctions: tuple[Junction, ...]
     streets: tuple[Street, ...]
@@ -138,13 +139,13 @@ def read_plan(path: Path) -> StreetPlan:
     """
     table = json.loads(path.read_text(encoding="utf-8"))
     sections = {name: _build(CrossSection, row) for name, row in table["sections"].items()}
-    return StreetPlan(
-        name=table["name"],
-        latitude=table["latitude"],
-        longitude=table["longitude"],
-        junctions=tuple(_junction(row) for row in table["junctions"]),
-        streets=tuple(_street(row, sections) for row in table["streets"]),
-    )
+    values = {
+        **{key: value for key, value in table.items() if key != "sections"},
+        "junctions": tuple(_junction(row) for row in table["junctions"]),
+        "streets": tuple(_street(row, sections) for row in table["streets"]),
+    }
+    plan: StreetPlan = _build(StreetPlan, values)
+    return plan
 
 
 def _junction(row: Mapping[str, Any]) -> Junction:
