@@ -1,16 +1,19 @@
 """How kernels are compiled and where their machine code is kept.
 
-Numba's own cache goes stale when a helper in another module changes, so every kernel is cached in a
-directory of the user's cache folder that is named by all kernel sources, Numba's version and the
-CPU. A change of any of these gives a new directory, never stale code.
+Numba's own cache goes stale when a helper in another module changes, so a kernel is cached in a
+directory of the user's cache folder that is named by its source and those it builds on, Numba's
+version and the CPU. A change of any of these gives a new directory, never stale code.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
+import re
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,14 +26,35 @@ from platformdirs import user_cache_path
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_PACKAGE_ROOTS = ("di_envs", "agents")
+_IMPORT = re.compile(rb"^from ((?:di_envs|agents)[.\w]*) import", re.MULTILINE)
 
 
-def kernel_sources() -> list[Path]:
-    """Every Python file of ours that defines a kernel, in a fixed order."""
-    top = Path(__file__).resolve().parent.parent
-    files = (path for root in _PACKAGE_ROOTS for path in sorted((top / root).rglob("*.py")))
-    return [path for path in files if "@kernel" in path.read_text(encoding="utf-8")]
+@cache
+def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
+    """A module's source, and the modules of ours that it imports names from."""
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    spec = None if loaded else importlib.util.find_spec(module)
+    path = loaded or (spec.origin if spec else None)
+    text = Path(path).read_bytes() if path else b""
+    imported = {match.decode() for match in _IMPORT.findall(text)}
+    return text, tuple(sorted(imported))
+
+
+@cache
+def sources_digest(module: str) -> str:
+    """Names a module's source and all sources of ours that it builds on, directly or not."""
+    seen: dict[str, bytes] = {}
+    todo = [module]
+    while todo:
+        name = todo.pop()
+        if name not in seen:
+            seen[name], imported = _source(name)
+            todo += imported
+    digest = hashlib.sha256()
+    for name in sorted(seen):
+        digest.update(name.encode() + b"\0" + seen[name] + b"\0")
+    digest.update(f"{numba.__version__} {sys.version_info[:3]} {cpu_capability()}".encode())
+    return digest.hexdigest()[:16]
 
 
 def cpu_capability() -> str:
@@ -40,19 +64,21 @@ def cpu_capability() -> str:
     return f"{llvmlite.binding.get_host_cpu_name()}-{digest}"
 
 
-def cache_directory() -> Path:
-    """The folder of this version's machine code, below the user's cache folder."""
-    digest = hashlib.sha256()
-    for path in kernel_sources():
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    digest.update(f"{numba.__version__} {sys.version_info[:3]} {cpu_capability()}".encode())
-    return user_cache_path("driveinsight") / "kernels" / digest.hexdigest()[:16]
+def kernel_sources() -> list[Path]:
+    """Every file of ours that defines kernels, in a fixed order."""
+    top = Path(__file__).resolve().parent.parent
+    files = (path for root in ("di_envs", "agents") for path in sorted((top / root).rglob("*.py")))
+    return [path for path in files if "\n@kernel\n" in path.read_text(encoding="utf-8")]
 
 
-numba.config.CACHE_DIR = str(cache_directory())
+def kernel_cache() -> Path:
+    """The folder of compiled kernels, below the user's cache folder."""
+    return user_cache_path("driveinsight") / "kernels"
 
 
 def kernel(function: Function) -> Function:
     """Compiles `function` without the Python interpreter, releasing the GIL, never `fastmath`."""
+    # read by Numba as it sets up the function's cache, just below
+    numba.config.CACHE_DIR = str(kernel_cache() / sources_digest(function.__module__))
     compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     return compiled

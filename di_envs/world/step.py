@@ -71,7 +71,7 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
         state.tick[()] += 1
         advance_lights(state, scenery.signals)
         _move_traffic(state, scenery, scratch, egos, vehicle_end)
-        move_walkers(state, scenery.walk, scenery.crosswalks, scenery.lanes, vehicle_end)
+        move_walkers(state, scenery.walk, scenery.signals, vehicle_end)
         for ego in range(egos):
             if state.kind[ego] != _ABSENT:
                 move_ego(state, ego, scenery.ego_model)
@@ -104,4 +104,6 @@ def _move_traffic(state, scenery, scratch, egos, vehicle_end):
             )
     for actor in range(egos, vehicle_end):
         if state.kind[actor] != _ABSENT:
-            move_vehicle(state, lanes, tables, actor, scratch.acceleration[actor], scratch.cap[actor])
+            move_vehicle(
+                state, lanes, tables, actor, scratch.acceleration[actor], scratch.cap[actor]
+            )
