@@ -1,0 +1,225 @@
+"""Suites: named, versioned sets of routes with the town, timeout, weather and traffic they go with.
+
+A suite is a JSON file in `town/data/suites`. A change that can move a score needs a new version.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from di_envs.config import WEATHERS, check_name
+from di_envs.town.plan import RoutePlan
+from di_envs.town.road_graph import build_road_graph
+from di_envs.town.router import MAX_SNAP_M, plan_route
+from di_envs.town.routes import RouteSpec, read_routes
+from di_envs.town.town import Town
+
+DATA = Path(__file__).resolve().parent / "town" / "data"
+TIMEOUT_RULES = ("carla-1.0",)  # int(0.8 s/m x length + 5 s), see RoutePlan.timeout_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficLevel:
+    """How many others there are."""
+
+    vehicles: int
+    walkers: int
+
+    def __post_init__(self) -> None:
+        for name, count in dataclasses.asdict(self).items():
+            if type(count) is not int or count < 0:
+                raise ValueError(f"Traffic '{name}' must be a whole number >= 0, got {count!r}.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """What an evaluation drives.
+
+    Attributes:
+        name: Of a shipped suite, or the stem of the user's route file.
+        version: Rises with every change that can move a score; 0 for the user's own files.
+        description: One line for lists of suites.
+        town: Name of a shipped town, or path of an OpenDRIVE file.
+        routes: Name of a shipped route file, or path of one.
+        signals: As `load_town` takes it; None for those in the map.
+        timeout_rule: Name of the rule for the route timeout.
+        weather: Name of one of CARLA's presets.
+        traffic: How many others there are.
+        max_snap_m: Largest distance of a keypoint from its lane.
+    """
+
+    name: str
+    version: int
+    description: str
+    town: str
+    routes: str
+    signals: str | None = None
+    timeout_rule: str = "carla-1.0"
+    weather: str = "ClearNoon"
+    traffic: TrafficLevel = TrafficLevel(vehicles=120, walkers=60)
+    max_snap_m: float = MAX_SNAP_M
+
+    def __post_init__(self) -> None:
+        check_name(self.timeout_rule, TIMEOUT_RULES, "timeout rule")
+        check_name(self.weather, WEATHERS, "weather")
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """A suite of what its JSON file says.
+
+        Raises:
+            ValueError: If a field is unknown or missing.
+        """
+        fields = dataclasses.fields(cls)
+        for key in values:
+            check_name(key, [field.name for field in fields], "suite field")
+        required = [field.name for field in fields if field.default is dataclasses.MISSING]
+        if missing := [name for name in required if name not in values]:
+            raise ValueError(f"A suite needs {', '.join(required)}; {', '.join(missing)} missing.")
+        given = dict(values)
+        if "traffic" in given:
+            given["traffic"] = TrafficLevel(**given["traffic"])
+        return cls(**given)
+
+    @property
+    def routes_path(self) -> Path:
+        """The route file."""
+        return _shipped(self.routes, DATA / "routes", ".xml")
+
+    @property
+    def town_path(self) -> Path:
+        """The OpenDRIVE file."""
+        return _shipped(self.town, DATA, ".xodr")
+
+    def specs(
+        self, town: str | None = None, route_ids: Sequence[str] | None = None
+    ) -> list[RouteSpec]:
+        """The suite's routes as their file has them, in the order of the file.
+
+        Args:
+            town: Of a file with routes in several towns, take those of this one.
+            route_ids: Take only these; None takes all.
+
+        Raises:
+            RouteFileError: If the file is broken.
+            ValueError: If an id is unknown, or no route is in this town.
+        """
+        specs = _of_town(read_routes(self.routes_path), town, self.routes_path)
+        if route_ids is None:
+            return specs
+        known = {spec.route_id: spec for spec in specs}
+        wanted = [str(route_id) for route_id in route_ids]
+        for route_id in wanted:
+            check_name(route_id, known, f"route id in suite '{self.name}'")
+        return [spec for spec in specs if spec.route_id in wanted]
+
+    def plans(self, town: Town, route_ids: Sequence[str] | None = None) -> tuple[RoutePlan, ...]:
+        """Plans the suite's routes in its town.
+
+        Args:
+            town: The town that `town_path` and `signals` describe, loaded.
+            route_ids: Plan only these, in the order of the file; None plans all.
+
+        Raises:
+            ValueError: As `specs`, and if a route cannot be planned (`RouteError`).
+        """
+        graph = build_road_graph(town)
+        return tuple(
+            plan_route(
+                town,
+                spec.positions,
+                route_id=spec.route_id,
+                graph=graph,
+                max_snap_m=self.max_snap_m,
+            )
+            for spec in self.specs(town.name, route_ids)
+        )
+
+
+def suite_names() -> tuple[str, ...]:
+    """Names of the shipped suites, in alphabetical order."""
+    return tuple(sorted(path.stem for path in (DATA / "suites").glob("*.json")))
+
+
+def load_suite(name: str) -> Suite:
+    """Reads a shipped suite.
+
+    Raises:
+        ValueError: If there is none of this name; suggests the nearest.
+    """
+    check_name(name, suite_names(), "suite")
+    text = (DATA / "suites" / f"{name}.json").read_text(encoding="utf-8")
+    return Suite.from_mapping(json.loads(text))
+
+
+def choose_suite(
+    suite: str | None = None,
+    *,
+    town: str | Path | None = None,
+    routes: str | Path | None = None,
+    signals: str | None = None,
+) -> Suite:
+    """The suite that a user asks for, by name, by files, or by a name with files in its place.
+
+    Args:
+        suite: Name of a shipped suite.
+        town: Name of a shipped town, or OpenDRIVE file, instead of the suite's.
+        routes: Name of a shipped route file, or route file, instead of the suite's.
+        signals: As `load_town` takes it, instead of the suite's. Another town does not inherit the
+            suite's signals.
+
+    Raises:
+        ValueError: If the name is unknown, if there is neither a name nor both files, or if a file
+            is not there.
+    """
+    if suite is None and (town is None or routes is None):
+        raise ValueError(
+            "Expected suite=NAME, or both town=FILE and routes=FILE, got "
+            f"suite={suite!r}, town={town!r}, routes={routes!r}; "
+            f"shipped suites: {', '.join(suite_names())}."
+        )
+    chosen = load_suite(suite) if suite is not None else _own_files()
+    changes: dict[str, Any] = {}
+    if town is not None:
+        changes |= {"town": str(town), "signals": None}
+    if routes is not None:
+        changes |= {"routes": str(routes), "name": Path(routes).stem}
+    if changes:
+        changes |= {"version": 0, "max_snap_m": MAX_SNAP_M}
+    if signals is not None:
+        changes["signals"] = signals
+    chosen = dataclasses.replace(chosen, **changes)
+    for path in (chosen.town_path, chosen.routes_path):
+        if not path.is_file():
+            raise ValueError(f"There is no file '{path}'; check the path.")
+    return chosen
+
+
+def _own_files() -> Suite:
+    return Suite(name="", version=0, description="Routes of your own.", town="", routes="")
+
+
+def _of_town(specs: list[RouteSpec], town: str | None, path: Path) -> list[RouteSpec]:
+    """The routes of one town, where a file holds several; a file for one town is taken whole."""
+    towns = dict.fromkeys(spec.town for spec in specs)
+    if town is None or len(towns) == 1:
+        return specs
+    chosen = [spec for spec in specs if spec.town.casefold() == town.casefold()]
+    if not chosen:
+        raise ValueError(f"{path}: no route is in town '{town}'; its towns: {', '.join(towns)}.")
+    return chosen
+
+
+def _shipped(name: str, folder: Path, suffix: str) -> Path:
+    """A shipped file by its bare name, or the file at a path."""
+    bare = Path(name)
+    if bare.parent == Path() and bare.suffix in ("", suffix):
+        shipped = folder / f"{bare.stem}{suffix}"
+        if shipped.is_file() and not bare.is_file():
+            return shipped
+    return bare
