@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from di_envs.town.build_town05 import FACTS, TOWN05, build_town05
-from di_envs.town.junction_layout import arms_of, movements
+from di_envs.town.junction_arms import arms_of, movements
 from di_envs.town.lanes import LaneKind, Turn
 from di_envs.town.loading import load_town
 from di_envs.town.street_plan import Control, read_plan

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from di_envs.town.build_toy import FACTS
-from di_envs.town.junction_layout import arms_of, corner_pairs, movements
+from di_envs.town.junction_arms import arms_of, corner_pairs, movements
 from di_envs.town.lanes import Turn
 from di_envs.town.street_plan import CrossSection, read_plan
 
