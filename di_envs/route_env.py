@@ -86,17 +86,14 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         suite = choose_suite(
             config.suite, town=config.town, routes=config.routes, signals=config.signals
         )
+        vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
+        walkers = suite.traffic.walkers if config.walkers is None else config.walkers
         self.config = dataclasses.replace(
-            config,
-            traffic=suite.traffic.vehicles if config.traffic is None else config.traffic,
-            walkers=suite.traffic.walkers if config.walkers is None else config.walkers,
-            weather=config.weather or suite.weather,
+            config, traffic=vehicles, walkers=walkers, weather=config.weather or suite.weather
         )
         town = load_town(suite.town_path, suite.signals)
         self.plans = suite.plans(town, config.route_ids)
-        self.world = World(
-            town, WorldConfig(vehicles=self.config.traffic, walkers=self.config.walkers)
-        )
+        self.world = World(town, WorldConfig(vehicles=vehicles, walkers=walkers))
         self.observation_space = observation_space(config.observations)
         self.action_space = action_space()
         self._observer = Observer(town, config.observations, _EGO)
