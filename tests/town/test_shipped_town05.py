@@ -136,6 +136,23 @@ def test_lights_take_turns_by_arm_but_for_the_two_that_share_a_phase(xml):
     assert all(row == list(range(len(row))) for row in sequences)
 
 
+def test_all_lanes_into_junctions_have_a_stop_line_but_the_roads_across_three_ts(town):
+    lanes, signals = town.lanes, town.signals
+    groups = dict(zip(town.junction_names, signals.groups.tolist(), strict=True))
+    assert Counter(groups.values()) == {0: 6, 4: 10, 3: 4, 2: 1}
+    assert groups["1148"] == 2
+    into = (lanes.kind == LaneKind.DRIVING) & (lanes.junction < 0)
+    free = np.flatnonzero(into & (lanes.stop_line < 0))
+    assert Counter(town.road_names[lanes.road[lane]] for lane in free) == {
+        **{"9": 2, "10": 2},  # the left loop past junction 924
+        **{"30": 2, "31": 2},  # x = 30 past 1162
+        **{"34": 1, "35": 1},  # the D road past 224
+    }
+    poles = signals.pose[signals.stop_signal]
+    assert turned(poles[:, 3], signals.stop_pose[:, 3]).max() < math.radians(0.1)
+    assert np.hypot(*(poles - signals.stop_pose)[:, :2].T).max() < 13.0
+
+
 def test_carla_loads_it_without_nan_and_finds_no_dead_end(ours):
     waypoints = ours.generate_waypoints(2.0)
     assert len(waypoints) > 11_000
