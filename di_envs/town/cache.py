@@ -12,6 +12,7 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from platformdirs import user_cache_path
@@ -21,16 +22,21 @@ from di_envs.town.town import Town
 
 # The modules that decide what a town's arrays hold; a test compares them with what is imported.
 READER_MODULES = (
+    "arms",
     "cache",
     "conflicts",
+    "crosswalks",
     "lanes",
     "links",
     "loading",
+    "map_signals",
     "network",
     "opendrive",
     "queries",
     "reference_line",
     "sampling",
+    "sidecar",
+    "signals",
     "stretches",
     "town",
 )
@@ -50,11 +56,11 @@ def reader_version() -> str:
     return digest.hexdigest()
 
 
-def content_hash(opendrive: bytes, signals: str) -> str:
+def content_hash(opendrive: bytes, signals: bytes) -> str:
     """The identity of a town: its OpenDRIVE file, its signals and the reader."""
-    digest = hashlib.sha256(opendrive)
-    digest.update(b"\0" + signals.encode() + b"\0" + reader_version().encode())
-    return digest.hexdigest()[:32]
+    parts = (opendrive, signals, reader_version().encode())
+    digests = b"".join(hashlib.sha256(part).digest() for part in parts)
+    return hashlib.sha256(digests).hexdigest()[:32]
 
 
 def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | None:
@@ -82,7 +88,7 @@ def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | Non
     )
 
 
-_PARTS: dict[str, type] = {"lanes": Lanes, "signals": Signals, "crosswalks": Crosswalks}
+_PARTS: dict[str, Any] = {"lanes": Lanes, "signals": Signals, "crosswalks": Crosswalks}
 
 
 def store(town: Town, folder: Path) -> None:

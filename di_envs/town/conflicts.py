@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LaneKind, Lanes
@@ -13,7 +14,7 @@ CONFLICT_M = 3.0  # between lane centres
 LEVEL_M = 2.5  # lanes further apart in height pass above each other
 
 
-def find_conflicts(lanes: Lanes) -> dict[str, NDArray[np.generic]]:
+def find_conflicts(lanes: Lanes) -> dict[str, Any]:
     """The `conflict_*` arrays: each place from both lanes' side.
 
     Lanes of one road run beside each other and do not conflict, however narrow they are. Two lanes

@@ -52,7 +52,7 @@ class Lanes(NamedTuple):
     spacing_m: Float64  # between points
     speed_limit_mps: Float64
     first: Int32  # first point
-    count: Int32  # number of points, at least 2
+    count: Int32  # type: ignore[assignment]  # number of points, at least 2
     left: Int32  # driving lane beside it in the same direction and section, -1 where there is none
     right: Int32
     stop_line: Int32  # index into Signals' stop lines at this lane's end, -1 where there is none

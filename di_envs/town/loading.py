@@ -3,96 +3,131 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from pathlib import Path
 
-import numpy as np
-
 from di_envs.town import cache
-from di_envs.town.lanes import Crosswalks, Signals
+from di_envs.town.crosswalks import find_crosswalks
+from di_envs.town.lanes import Lanes
+from di_envs.town.map_signals import heads_in_map
 from di_envs.town.network import build_lanes, junction_names
-from di_envs.town.opendrive import read_opendrive
+from di_envs.town.opendrive import OpenDrive, read_opendrive
+from di_envs.town.sampling import LaneGeometry
+from di_envs.town.sidecar import guessed_heads, heads_of_sidecar, read_sidecar
+from di_envs.town.signals import Head, assemble_signals
+from di_envs.town.stretches import Stretch
 from di_envs.town.town import Town
 
 _DATA = Path(__file__).resolve().parent / "data"
-# One literal table of the towns that are shipped.
+# Two literal tables of what is shipped.
 TOWNS = {
     "town05": _DATA / "town05.xodr",
     "toy": _DATA / "toy.xodr",
 }
+SIDECARS = {
+    "town05": _DATA / "signals" / "town05.json",
+}
+FROM_MAP, SYNTHESISE, NO_SIGNALS = "map", "synthesise", "none"
 
 
-def load_town(town: str | Path, signals: str | Path | None = None) -> Town:
+def load_town(
+    town: str | Path, signals: str | Path | None = None, *, cache_folder: Path | None = None
+) -> Town:
     """Loads a town.
 
     Args:
         town: A shipped town's name ("town05", "toy") or an OpenDRIVE file.
-        signals: Where signals come from; see `di_envs.town.signals`.
+        signals: Where signals come from. None: the map; a map that carries none gives a warning.
+            "town05": the shipped sidecar for CARLA's own Town05, of any year. A file: a sidecar
+            (`di_envs.town.sidecar` has its format). "synthesise": a guess from the junctions'
+            shapes. "none": there are none.
+        cache_folder: Where parsed towns are kept; by default the user's cache folder.
 
     Raises:
-        FileNotFoundError: If there is no such file or shipped town.
-        ValueError: If the file cannot be read as a town.
+        FileNotFoundError: If there is no such file, shipped town or sidecar.
+        ValueError: If the file cannot be read as a town, or the sidecar does not fit it.
     """
-    path = _town_path(town)
+    path = _known_path(town, TOWNS, "OpenDRIVE file and no shipped town", ())
+    source, sidecar = _signal_source(signals)
     content = path.read_bytes()
-    key = cache.content_hash(content, str(signals))
-    folder = cache.cache_folder()
+    told = sidecar.read_bytes() if sidecar is not None else b""
+    key = cache.content_hash(content, source.encode() + b"\0" + told)
+    folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
+    # Undecodable bytes are the parser's to complain about.
     text = content.decode("utf-8", errors="replace")
-    stored = cache.load_cached(key, path.stem, text, folder)
-    if stored is not None:
-        return stored
-    document = read_opendrive(content, str(path))
-    lanes, _, _ = build_lanes(document, str(path))
-    names = junction_names(document)
-    loaded = cache.freeze(
-        Town(
-            name=path.stem,
-            lanes=lanes,
-            signals=_no_signals(len(names)),
-            crosswalks=_no_crosswalks(),
-            road_names=tuple(road.road_id for road in document.roads),
-            junction_names=names,
-            geo_origin=document.geo_origin,
-            content_hash=key,
-            opendrive=text,
-        )
-    )
-    cache.store(loaded, folder)
+    loaded = cache.load_cached(key, path.stem, text, folder)
+    if loaded is None:
+        loaded = cache.freeze(_parse(path, content, text, source, sidecar, key))
+        cache.store(loaded, folder)
+    if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
+        warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
     return loaded
 
 
-def _town_path(town: str | Path) -> Path:
-    if isinstance(town, str) and town in TOWNS:
-        return TOWNS[town]
-    path = Path(town)
-    if path.is_file():
-        return path
-    near = difflib.get_close_matches(str(town), TOWNS, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"shipped towns: {', '.join(TOWNS)}."
-    raise FileNotFoundError(f"No OpenDRIVE file and no shipped town '{town}'; {hint}")
-
-
-def _no_signals(junctions: int) -> Signals:
-    return Signals(
-        kind=np.zeros(0, np.int8),
-        junction=np.zeros(0, np.int32),
-        group=np.zeros(0, np.int32),
-        pose=np.zeros((0, 4)),
-        box=np.zeros((0, 6)),
-        stop_signal=np.zeros(0, np.int32),
-        stop_lane=np.zeros(0, np.int32),
-        stop_pose=np.zeros((0, 4)),
-        stop_width_m=np.zeros(0),
-        groups=np.zeros(junctions, np.int32),
+def _parse(
+    path: Path, content: bytes, text: str, source: str, sidecar: Path | None, key: str
+) -> Town:
+    document = read_opendrive(content, str(path))
+    lanes, geometry, stretches = build_lanes(document, str(path))
+    names = junction_names(document)
+    heads = _heads(document, lanes, stretches, geometry, source, sidecar)
+    signals, stop_line = assemble_signals(lanes, heads, len(names))
+    return Town(
+        name=path.stem,
+        lanes=lanes._replace(stop_line=stop_line),
+        signals=signals,
+        crosswalks=find_crosswalks(document, lanes, geometry),
+        road_names=tuple(road.road_id for road in document.roads),
+        junction_names=names,
+        geo_origin=document.geo_origin,
+        content_hash=key,
+        opendrive=text,
     )
 
 
-def _no_crosswalks() -> Crosswalks:
-    return Crosswalks(
-        start=np.zeros((0, 3)),
-        end=np.zeros((0, 3)),
-        width_m=np.zeros(0),
-        crossed_start=np.zeros(1, np.int32),
-        crossed_lane=np.zeros(0, np.int32),
-        crossed_begin_m=np.zeros(0),
-        crossed_end_m=np.zeros(0),
+def _heads(
+    document: OpenDrive,
+    lanes: Lanes,
+    stretches: list[Stretch],
+    geometry: LaneGeometry,
+    source: str,
+    sidecar: Path | None,
+) -> list[Head]:
+    if sidecar is not None:
+        rules = read_sidecar(sidecar)
+        return heads_of_sidecar(rules, lanes, junction_names(document), str(sidecar))
+    if source == FROM_MAP:
+        return heads_in_map(document, lanes, stretches, geometry)
+    return guessed_heads(lanes, junction_names(document)) if source == SYNTHESISE else []
+
+
+def _signal_source(signals: str | Path | None) -> tuple[str, Path | None]:
+    """What `signals` stands for, and the sidecar to read."""
+    if signals is None:
+        return FROM_MAP, None
+    if isinstance(signals, str) and signals in (SYNTHESISE, NO_SIGNALS):
+        return signals, None
+    words = (SYNTHESISE, NO_SIGNALS)
+    return "sidecar", _known_path(signals, SIDECARS, "sidecar file and no word for signals", words)
+
+
+def _known_path(
+    name: str | Path, shipped: dict[str, Path], what: str, words: tuple[str, ...]
+) -> Path:
+    if isinstance(name, str) and name in shipped:
+        return shipped[name]
+    path = Path(name)
+    if path.is_file():
+        return path
+    known = (*shipped, *words)
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"shipped: {', '.join(known)}."
+    raise FileNotFoundError(f"There is no {what} '{name}'; {hint}")
+
+
+def _no_signals_advice(path: Path) -> str:
+    return (
+        f"{path.name} carries no traffic signals, so nobody has to stop. Pass signals='town05' "
+        "(for CARLA's own Town05), signals='synthesise' (a guess from the junctions' shapes), a "
+        "sidecar file, or signals='none' to say that this is meant."
     )

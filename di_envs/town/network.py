@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +54,11 @@ def _assemble(
     samples: Samples,
     successors: list[set[int]],
 ) -> Lanes:
-    first = np.cumsum(samples.count) - samples.count
+    first = np.cumsum(samples.counts) - samples.counts
     junction = _junctions(document, stretches)
     predecessors = reversed_links(successors)
     left, right = _neighbours(document, stretches)
-    lane = np.repeat(np.arange(len(stretches)), samples.count)
+    lane = np.repeat(np.arange(len(stretches)), samples.counts)
     lanes = Lanes(
         kind=np.array([s.kind for s in stretches], dtype=np.int8),
         road=np.array([s.road for s in stretches], dtype=np.int32),
@@ -66,10 +67,10 @@ def _assemble(
         junction=junction,
         turn=_turns(stretches, junction, samples, first),
         length_m=samples.length,
-        spacing_m=samples.length / (samples.count - 1),
+        spacing_m=samples.length / (samples.counts - 1),
         speed_limit_mps=_speed_limits(document, stretches, geometry, successors, predecessors),
         first=first.astype(np.int32),
-        count=samples.count.astype(np.int32),
+        count=samples.counts.astype(np.int32),
         left=left,
         right=right,
         stop_line=np.full(len(stretches), -1, dtype=np.int32),
@@ -88,8 +89,8 @@ def _assemble(
     return lanes._replace(**find_conflicts(lanes))
 
 
-def _no_conflicts(count: int) -> dict[str, NDArray[np.generic]]:
-    empty: dict[str, NDArray[np.generic]] = {
+def _no_conflicts(count: int) -> dict[str, Any]:
+    empty: dict[str, Any] = {
         "conflict_start": np.zeros(count + 1, dtype=np.int32),
         "conflict_lane": np.zeros(0, dtype=np.int32),
     }
@@ -111,9 +112,11 @@ def junction_names(document: OpenDrive) -> tuple[str, ...]:
     return (*listed, *sorted(used - set(listed)))
 
 
-def _turns(stretches: list[Stretch], junction: Int32, samples: Samples, first: Float64) -> Int8:
+def _turns(
+    stretches: list[Stretch], junction: Int32, samples: Samples, first: NDArray[np.int64]
+) -> Int8:
     yaw = samples.points[:, 3]
-    change = yaw[first + samples.count - 1] - yaw[first]
+    change = yaw[first + samples.counts - 1] - yaw[first]
     turn = np.where(change < 0.0, Turn.LEFT, Turn.RIGHT)
     turn = np.where(np.abs(change) < STRAIGHT_BELOW_RAD, Turn.STRAIGHT, turn)
     driving = np.array([s.kind == LaneKind.DRIVING for s in stretches])
@@ -201,7 +204,7 @@ def _own_limit(document: OpenDrive, stretch: Stretch, geometry: LaneGeometry) ->
     return float("nan")
 
 
-def _spatial_index(points: Float64) -> dict[str, NDArray[np.generic]]:
+def _spatial_index(points: Float64) -> dict[str, Any]:
     origin = np.floor(points[:, :2].min(axis=0) / CELL_M) * CELL_M
     cell = np.floor((points[:, :2] - origin) / CELL_M).astype(np.int64)
     size = cell.max(axis=0) + 1

@@ -140,7 +140,7 @@ class OpenDrive:
 
     roads: tuple[RoadRecord, ...]
     junctions: dict[str, tuple[Connection, ...]]
-    light_order: dict[str, int]  # signal id -> sequence of its controller
+    light_order: dict[str, tuple[int, int]]  # signal id -> (sequence, place) of its controller
     geo_origin: tuple[float, float]
 
 
@@ -393,14 +393,17 @@ def _connections(junction: Element) -> tuple[Connection, ...]:
     )
 
 
-def _light_order(root: Element) -> dict[str, int]:
-    """The place of each signal in its junction's sequence, from the junctions' controllers."""
-    sequence = {
-        c.get("id"): int(_number(c, "sequence", 0.0)) for c in root.iterfind("junction/controller")
+def _light_order(root: Element) -> dict[str, tuple[int, int]]:
+    """Whose turn a signal has: its junction's sequence of controllers, then their place in it."""
+    turns = {
+        controller.get("id"): (int(_number(controller, "sequence", 0.0)), place)
+        for junction in root.iterfind("junction")
+        for place, controller in enumerate(junction.iterfind("controller"))
     }
     return {
-        control.get("signalId", ""): sequence.get(controller.get("id"), 0)
+        control.get("signalId", ""): turns[controller.get("id")]
         for controller in root.iterfind("controller")
+        if controller.get("id") in turns
         for control in controller.iterfind("control")
     }
 

@@ -26,7 +26,7 @@ MINIMUM_LANE_LENGTH = 1e-3  # m; keeps spacings positive where a section has no 
 class Samples(NamedTuple):
     """Arrays over L lanes and P points, lane after lane in their direction of travel."""
 
-    count: Int64  # (L,)
+    counts: Int64  # (L,)
     length: Float64  # (L,) m
     points: Float64  # (P, 4) x, y, z, yaw: world frame
     width: Float64  # (P,) m
@@ -132,8 +132,8 @@ def sample_lanes(geometry: LaneGeometry, stretches: list[Stretch]) -> Samples:
     outward, inward = geometry.crossing(record, station)
     yaw = -heading + np.where(forward[lane], 0.0, np.pi)
     points = np.stack([x, -y, z, _continuous(yaw, lane)], axis=1)
-    length = np.bincount(lane[1:], _steps(x, y, lane), minlength=len(stretches))
-    length = np.maximum(length, MINIMUM_LANE_LENGTH)
+    total = np.bincount(lane[1:], _steps(x, y, lane), minlength=len(stretches))
+    length = np.maximum(total, MINIMUM_LANE_LENGTH)
     return Samples(count, length, points, width, station, outward, inward, record)
 
 
