@@ -21,7 +21,7 @@ ANY_MASK = (1 << len(LaneKind)) - 1
 
 _DRIVING = int(LaneKind.DRIVING)
 _MOST_LANES_BELOW = 4
-_END_MARGIN_M = 0.25  # half the distance between two points
+_ABREAST_M = 0.3  # a little more than half the distance between two points
 _WIDEST_LANE_M = 8.0  # how far a box looks for lanes that reach below it
 
 
@@ -196,8 +196,7 @@ def lanes_below_box(lanes, x, y, z, yaw, half_length, half_width, out):
     nearest = np.full(_MOST_LANES_BELOW, 1e30)  # squared distances of those in `out`
     out[:] = -1
     points, point_lane, kind, width = lanes.points, lanes.point_lane, lanes.kind, lanes.width_m
-    first, lane_count, cell_start = lanes.first, lanes.count, lanes.cell_start
-    columns, cell = lanes.grid_size[0], lanes.cell_m[0]
+    cell_start, columns, cell = lanes.cell_start, lanes.grid_size[0], lanes.cell_m[0]
     reach = math.hypot(half_length, half_width) + 0.5 * _WIDEST_LANE_M
     c, s = math.cos(yaw), math.sin(yaw)
     low_i, high_i = _cells(x, reach, lanes.grid_origin[0], cell, columns)
@@ -212,10 +211,8 @@ def lanes_below_box(lanes, x, y, z, yaw, half_length, half_width, out):
                 continue
             if abs(points[point, 2] - z) > LEVEL_M:
                 continue
-            k, turn = point - first[lane], points[point, 3] - yaw
-            end = -1 if k == 0 else (1 if k == lane_count[lane] - 1 else 0)
-            ahead, right = c * dx + s * dy, c * dy - s * dx
-            if _touches(ahead, right, turn, width[point], end, half_length, half_width):
+            ahead, right, turn = c * dx + s * dy, c * dy - s * dx, points[point, 3] - yaw
+            if _touches(ahead, right, turn, width[point], half_length, half_width):
                 _keep_nearest(out, nearest, lane, square)
     found = 0
     while found < _MOST_LANES_BELOW and out[found] >= 0:
@@ -232,22 +229,23 @@ def _cells(centre, reach, origin, cell, size):
 
 
 @kernel
-def _touches(ahead, right, turn, width, end, half_length, half_width):
-    """Whether a lane's band at one of its points reaches into a box.
+def _touches(ahead, right, turn, width, half_length, half_width):
+    """Whether a lane's band reaches into a box abreast of one of its points.
+
+    Abreast: the box's nearest point must lie beside it, not before or behind, or a lane would
+    reach beyond its ends. Where the two do overlap, there is such a point.
 
     Args:
         ahead, right: The point in the box's frame [m].
         turn: The lane's yaw in the box's frame [rad].
         width: The lane's width there [m].
-        end: -1 at the lane's first point, 1 at its last, 0 between.
         half_length, half_width: The box's size [m].
     """
     gap_x = min(max(ahead, -half_length), half_length) - ahead  # from the point to the box
     gap_y = min(max(right, -half_width), half_width) - right
     if gap_x * gap_x + gap_y * gap_y >= 0.25 * width * width:
         return False
-    # A lane ends at its ends: a box behind or before them is not on it.
-    return end * (gap_x * math.cos(turn) + gap_y * math.sin(turn)) <= _END_MARGIN_M
+    return abs(gap_x * math.cos(turn) + gap_y * math.sin(turn)) <= _ABREAST_M
 
 
 @kernel
