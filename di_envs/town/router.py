@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from di_envs.town.crossings import name_connectors
 from di_envs.town.plan import RoadOption, RoutePlan
 from di_envs.town.road_graph import STEP_M, Edge, RoadGraph, build_road_graph
 from di_envs.town.snapping import Snap
@@ -82,7 +83,8 @@ def plan_route(
         piece = _trace_path(graph, path, snaps[leg], snaps[leg + 1], places[leg + 1], turns)
         pieces.append(piece.trace)
         options.extend(piece.options)
-    return _plan_of(town, route_id, places, join_traces(pieces), np.array(options, np.int8))
+    trace = name_connectors(town.lanes, join_traces(pieces))
+    return _plan_of(town, route_id, places, trace, np.array(options, np.int8))
 
 
 def target_indices(
@@ -226,9 +228,9 @@ def _ending_on(along: Trace, edge: Edge, following: Edge) -> Trace:
     """Gives the last point, at which several lanes may begin, to the lane that is followed."""
     if following.lane in (edge.lane, along.lane[-1]):
         return along
-    owner = along.lane.copy()
-    owner[-1] = following.lane
-    return along._replace(lane=owner)
+    lane, lane_m = along.lane.copy(), along.lane_m.copy()
+    lane[-1], lane_m[-1] = following.lane, 0.0
+    return along._replace(lane=lane, lane_m=lane_m)
 
 
 def _beyond_change(graph: RoadGraph, edge: Edge, here: Trace) -> Trace:
