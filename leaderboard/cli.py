@@ -185,8 +185,9 @@ def _evaluate(command: Evaluate) -> int:
             spec, range(command.seeds), suite=suite, folder=folder, workers=command.workers
         )
     except (SetupError, ResultsError) as error:
-        _remove_if_empty(folder)
         raise UsageError(str(error)) from error
+    finally:
+        _remove_if_empty(folder)
     _print_run(run, folder)
     return 0 if run.complete else EXIT_INTERRUPTED
 

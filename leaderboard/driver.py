@@ -10,7 +10,7 @@ from di_envs.route_env import RouteEnv
 
 from agents import load_agent
 from agents.base import Agent, Requirements
-from leaderboard.episode import drive_route
+from leaderboard.episode import close_agent, drive_route
 from leaderboard.jobs import Job, RunSpec
 from leaderboard.record import RouteRecord
 from leaderboard.rules import rules_named
@@ -51,7 +51,7 @@ def agent_requirements(spec: str) -> Requirements:
     try:
         return agent.requires
     finally:
-        agent.close()
+        close_agent(agent)
 
 
 def environment_options(options: Mapping[str, Any], requires: Requirements) -> dict[str, Any]:

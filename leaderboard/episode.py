@@ -105,7 +105,7 @@ def _drive(
             log.hashes.add_events(events)
             log.events += [_event_record(event, view) for event in events]
     finally:
-        _close(agent)
+        close_agent(agent)
 
 
 def _start(
@@ -150,7 +150,7 @@ def _step(env: Any, control: Any) -> tuple[Mapping[str, Any], float, bool, list[
     return observation, float(reward), terminated or truncated, info["events"]
 
 
-def _close(agent: Agent[Any]) -> None:
+def close_agent(agent: Agent[Any]) -> None:
     """Closes the agent; one that cannot even close has driven all the same."""
     try:
         agent.close()

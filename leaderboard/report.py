@@ -131,12 +131,14 @@ def _summary(records: Sequence[RouteRecord]) -> str:
 
 
 def _infraction_table(run: RunRecord) -> Table:
-    table = Table(title="infractions per km", title_justify="left", title_style="bold")
-    counts = count_infractions(event.kind for record in run.routes for event in record.events)
+    table = Table(title="infractions", title_justify="left", title_style="bold")
+    table.add_column("kind")
+    table.add_column("count", justify="right")
+    table.add_column("per km", justify="right")
     driven_m = math.fsum(record.done_m for record in run.routes)
-    for kind in counts:
-        table.add_column(SHORT_NAMES[kind], justify="right")
-    table.add_row(*(f"{infractions_per_km(count, driven_m):.3f}" for count in counts.values()))
+    kinds = count_infractions(event.kind for record in run.routes for event in record.events)
+    for kind, count in kinds.items():
+        table.add_row(SHORT_NAMES[kind], str(count), f"{infractions_per_km(count, driven_m):.3f}")
     return table
 
 

@@ -39,5 +39,5 @@ def test_seed_and_route_do_not_run_together():
 
 @pytest.mark.parametrize(("routes", "seeds"), [([], [0]), (["a"], []), (["a", "a"], [0])])
 def test_nothing_to_do_and_the_same_thing_twice_are_refused(routes, seeds):
-    with pytest.raises(ValueError, match="there is no|given twice"):
+    with pytest.raises(ValueError, match=r"there is no|given twice"):
         plan_jobs(routes, seeds)
