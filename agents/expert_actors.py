@@ -1,0 +1,198 @@
+# mypy: disallow_untyped_defs=False
+"""Everybody else, seen from the expert's path: leaders, gaps for lane changes, walkers, as kernels."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.expert_line import project
+from agents.expert_path import STEP_M
+from agents.expert_speed import NO_LIMIT_MPS2, follow, stop_within, time_to
+from di_envs.geometry import wrap_angle
+from di_envs.kernels import kernel
+from di_envs.world.state import ActorKind
+
+LEVEL_M = 3.0  # whoever is further above or below is on another level
+LOOK_M, LOOK_S = 35.0, 4.0  # others are looked at within this and the way driven in this time
+BACK_M = 60.0  # of path behind the car, where followers are
+CROSSING_RAD = 0.6  # whoever stands at more than this angle to the path crosses it
+LEADER_BRAKING_MPS2 = 8.0  # what the vehicle ahead may do
+SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
+WALKER_LOOK_S = 6.0
+BLOCKED_GAP_M = 1.5
+PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
+FAR_M = 1e6
+
+_ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
+
+
+class Sight(NamedTuple):
+    """What `look` finds: numbers by their place in `number`, and those who cross."""
+
+    number: NDArray[np.float64]  # (7,) see the constants below
+    holder: NDArray[np.int32]  # (32,) vehicles with a grant for a junction near
+    holders: NDArray[np.int32]  # (1,) how many
+
+
+BEST, LEADER_REAR, LEADER_SPEED, FRONT_OK, REAR_OK, INSIDE_M, ROOM_M = range(7)
+
+
+@kernel
+def blank_sight():
+    """Room for what `look` finds; nothing seen yet."""
+    number = np.zeros(7)
+    number[BEST] = NO_LIMIT_MPS2
+    number[LEADER_REAR] = FAR_M
+    number[FRONT_OK] = 1.0
+    number[REAR_OK] = 1.0
+    number[ROOM_M] = FAR_M
+    return Sight(number, np.zeros(32, np.int32), np.zeros(1, np.int32))
+
+
+@kernel
+def behind_leader(gap_m, speed, leader_speed, numbers):
+    """Acceleration behind a leader: the driver model's, and never too fast to stop behind it."""
+    room = max(gap_m - 0.7, 0.0) + leader_speed * leader_speed / (2.0 * LEADER_BRAKING_MPS2)
+    braking = numbers.emergency_mps2 - 1.0
+    step = braking * numbers.dt_s
+    safe = -step + math.sqrt(step * step + 2.0 * braking * room)
+    return min(
+        follow(gap_m, speed, leader_speed, numbers),
+        max((safe - speed) / numbers.dt_s, -numbers.emergency_mps2),
+    )
+
+
+@kernel
+def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, shift, span, numbers):
+    """Follows a vehicle on the path; notes gaps beside it and room beyond the junction."""
+    number, speed = sight.number, actors.speed[ego]
+    cos, sin = math.cos(turn), math.sin(turn)
+    length = actors.half_length[actor] * abs(cos) + actors.half_width[actor] * abs(sin)
+    width = actors.half_length[actor] * abs(sin) + actors.half_width[actor] * abs(cos)
+    along, across = actors.speed[actor] * cos, actors.speed[actor] * sin
+    half = actors.half_length[ego]
+    rear, front = station - length, station + length
+    # A vehicle that changes lanes counts on the lane that it leaves and on the one that it enters.
+    aside = offset - actors.lateral_m[actor] if actors.changing_from[actor] >= 0 else offset
+    if shift != 0.0:
+        _note_gap(
+            sight,
+            actors,
+            actor,
+            ego,
+            rear,
+            front,
+            along,
+            offset + shift,
+            aside + shift,
+            width,
+            progress,
+            numbers,
+        )
+    reach = actors.half_width[ego] + width + numbers.side_margin_m
+    if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
+        return
+    gap = rear - progress.station_m - half
+    if abs(turn) > CROSSING_RAD and abs(across) > 1.0:
+        leaving = (reach - math.copysign(offset, across * offset)) / abs(across)
+        if gap > (leaving + SPARE_S) * speed + BLOCKED_GAP_M:
+            return
+    number[BEST] = min(number[BEST], behind_leader(gap, speed, max(along, 0.0), numbers))
+    if rear < number[LEADER_REAR]:
+        number[LEADER_REAR] = rear
+        number[LEADER_SPEED] = max(along, 0.0)
+    if rear > span[1]:
+        number[ROOM_M] = min(number[ROOM_M], rear + along * along / 8.0 - span[1])
+    elif front > span[0]:
+        number[INSIDE_M] += 2.0 * actors.half_length[actor] + numbers.exit_gap_m
+
+
+@kernel
+def _note_gap(
+    sight, actors, actor, ego, rear, front, along, offset, aside, width, progress, numbers
+):
+    """Whether a vehicle on the lane to change to leaves the gap free. Offsets are from that lane."""
+    if min(abs(offset), abs(aside)) > width + actors.half_width[ego] + 0.2:
+        return
+    speed, half = actors.speed[ego], actors.half_length[ego]
+    ahead = rear - progress.station_m - half
+    behind = progress.station_m - half - front
+    if rear + front > 2.0 * progress.station_m:
+        braking = -follow(max(ahead, 0.1), speed, along, numbers)
+        if ahead < BLOCKED_GAP_M or braking > numbers.change_front_mps2:
+            sight.number[FRONT_OK] = 0.0
+    else:
+        patience = 2.0 if progress.waiting_s > PATIENT_S else 1.0
+        closing = max(along - speed, 0.0)
+        wanted = BLOCKED_GAP_M + 0.6 * along / patience
+        wanted += closing * closing / (2.0 * patience * numbers.change_rear_mps2)
+        if behind < wanted:
+            sight.number[REAR_OK] = 0.0
+
+
+@kernel
+def _note_walker(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
+    """Stops before a walker who is on the path, or will be when the car is there."""
+    across = actors.speed[actor] * math.sin(turn)
+    along = actors.speed[actor] * math.cos(turn)
+    half, body = actors.half_length[ego], actors.half_length[actor]
+    reach = actors.half_width[ego] + body + numbers.walker_margin_m
+    enters, leaves = 0.0, WALKER_LOOK_S
+    if abs(across) > 0.2:
+        towards = -math.copysign(offset, offset * across)  # positive while coming nearer
+        enters = max((towards - reach) / abs(across), 0.0)
+        leaves = (towards + reach) / abs(across)
+    if (abs(offset) >= reach and abs(across) <= 0.2) or leaves <= 0.0 or enters > WALKER_LOOK_S:
+        return
+    meeting = station + along * min(enters, 2.0)
+    distance = meeting - body - progress.station_m - half
+    if distance < -half and abs(offset) > actors.half_width[ego] + body:
+        return
+    if station + body < progress.station_m:
+        return
+    arrives = time_to(times, distance - 0.5)
+    gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
+    if arrives > leaves + SPARE_S or gone + SPARE_S < enters:
+        return
+    stop = stop_within(distance - numbers.walker_gap_m, actors.speed[ego], numbers)
+    sight.number[BEST] = min(sight.number[BEST], stop)
+
+
+@kernel
+def look(sight, path, progress, actors, ways, ego, shift, span, junction, times, numbers):
+    """Looks at all actors near the car.
+
+    Args:
+        sight: From `blank_sight`; filled.
+        shift: Offset of the present lane from the one to change to next, 0 where none is due.
+        span: Stations where the next junction begins and ends.
+        junction: Index of the junction that the car is on or comes to next, -1 for none.
+        times: From `forecast`.
+    """
+    speed = actors.speed[ego]
+    reach = LOOK_M + LOOK_S * speed
+    here = int(progress.station_m / STEP_M)
+    begin = max(here - int(BACK_M / STEP_M), 0)
+    end = min(here + int(reach / STEP_M) + 8, path.x.size)
+    for actor in range(actors.kind.size):
+        if actor == ego or actors.kind[actor] == _ABSENT:
+            continue
+        dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
+        if dx * dx + dy * dy > reach * reach or abs(actors.z[actor] - actors.z[ego]) > LEVEL_M:
+            continue
+        station, offset, yaw = project(path, progress, actors.x[actor], actors.y[actor], begin, end)
+        turn = wrap_angle(actors.yaw[actor] - yaw)
+        if actors.kind[actor] == _WALKER:
+            _note_walker(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
+            continue
+        _note_vehicle(
+            sight, actors, actor, ego, station, offset, turn, progress, shift, span, numbers
+        )
+        way = actors.grant[actor]
+        if way >= 0 and ways.junction[way] == junction and sight.holders[0] < sight.holder.size:
+            sight.holder[sight.holders[0]] = actor
+            sight.holders[0] += 1
