@@ -1,5 +1,5 @@
 # mypy: disallow_untyped_defs=False
-"""Everybody else, seen from the expert's path: leaders, gaps for lane changes, walkers, as kernels."""
+"""Everybody else, seen from the expert's path: leaders, gaps, walkers, as kernels."""
 
 from __future__ import annotations
 
@@ -79,20 +79,9 @@ def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, sh
     # A vehicle that changes lanes counts on the lane that it leaves and on the one that it enters.
     aside = offset - actors.lateral_m[actor] if actors.changing_from[actor] >= 0 else offset
     if shift != 0.0:
-        _note_gap(
-            sight,
-            actors,
-            actor,
-            ego,
-            rear,
-            front,
-            along,
-            offset + shift,
-            aside + shift,
-            width,
-            progress,
-            numbers,
-        )
+        beside = min(abs(offset + shift), abs(aside + shift)) - width
+        if beside < actors.half_width[ego] + 0.2:
+            _note_gap(sight, actors, ego, rear, front, along, progress, numbers)
     reach = actors.half_width[ego] + width + numbers.side_margin_m
     if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
         return
@@ -112,12 +101,8 @@ def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, sh
 
 
 @kernel
-def _note_gap(
-    sight, actors, actor, ego, rear, front, along, offset, aside, width, progress, numbers
-):
-    """Whether a vehicle on the lane to change to leaves the gap free. Offsets are from that lane."""
-    if min(abs(offset), abs(aside)) > width + actors.half_width[ego] + 0.2:
-        return
+def _note_gap(sight, actors, ego, rear, front, along, progress, numbers):
+    """Whether a vehicle on the lane to change to leaves the gap free."""
     speed, half = actors.speed[ego], actors.half_length[ego]
     ahead = rear - progress.station_m - half
     behind = progress.station_m - half - front

@@ -54,7 +54,7 @@ def update_progress(path, progress, x, y, speed, half_length):
 
 @kernel
 def change_due(path, progress, speed):
-    """Offset of the present lane from the one to change to, if a change may begin (soon), else 0."""
+    """Offset of the present lane from the one to change to, if that is due soon, else 0."""
     k = progress.changes
     if k >= path.change_jump_m.size:
         return 0.0

@@ -2,14 +2,15 @@
 
 A dense route jumps sideways where it changes lanes and may step back where keypoints join. Here
 it becomes legs of lanes, then a *base line* sampled every half metre, which follows the new lane
-right from each jump, and a list of *lane changes*. Until the expert commits to a change, its path is
-the base line shifted by the change's offset, so that it can wait for a gap.
+right from each jump, and a list of *lane changes*. Until the expert commits to a change, its path
+is the base line shifted by the change's offset, so that it can wait for a gap.
 World frame; offsets are positive to the right.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -134,12 +135,12 @@ def _successors(lanes: Lanes, lane: int) -> list[int]:
 
 
 def join_legs(legs: list[Leg], lanes: Lanes) -> list[Leg]:
-    """Fills in lanes too short to have a route point, and stretches legs over linked lanes' ends."""
+    """Fills in lanes too short to have a route point, and stretches linked legs to their ends."""
     joined = [legs[0]]
     for leg in legs[1:]:
         joined.extend(Leg(lane, 0.0, 0.0) for lane in _skipped(lanes, joined[-1].lane, leg.lane))
         joined.append(leg)
-    for leg, following in zip(joined, joined[1:], strict=False):
+    for leg, following in pairwise(joined):
         if following.lane in _successors(lanes, leg.lane):
             leg.end_m = float(lanes.length_m[leg.lane])
             following.begin_m = 0.0

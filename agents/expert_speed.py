@@ -1,5 +1,5 @@
 # mypy: disallow_untyped_defs=False
-"""Accelerations that keep a speed, a gap or a stop, and when the expert would be where, as kernels."""
+"""Accelerations that keep a speed, a gap or a stop, and a forecast of arrivals, as kernels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ def cruise(path, station_m, speed, numbers):
 
 @kernel
 def follow(gap_m, speed, leader_speed, numbers):
-    """The Intelligent Driver Model's answer to a leader (Treiber et al., 2000), without its own cruise.
+    """The Intelligent Driver Model's answer to a leader, without its own cruise.
+
+    Source: Treiber, Hennecke, Helbing: Congested traffic states in empirical observations and
+    microscopic simulations, Phys. Rev. E 62, 2000; here with this driver's numbers.
 
     Args:
         gap_m: From bumper to bumper.
