@@ -14,15 +14,16 @@ import math
 import numpy as np
 
 from di_envs.kernels import kernel
-from di_envs.world.collisions import count_collision, forget_collisions
+from di_envs.world.bodies import Bodies, box_of, may_touch, overlap
+from di_envs.world.collisions import CollisionMemory, count_collision, forget_collisions
+from di_envs.world.event_rows import count_rows
 from di_envs.world.state import ActorKind
 
-SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels
 SLOP_M = 1e-3  # left between bodies that were pushed apart
 PASSES = 3  # pushing an ego out of one body may push it into the next
 DOWN = 2  # walk_waiting of a walker who was knocked down
 
-ABSENT, WALKER, PROP = int(ActorKind.ABSENT), int(ActorKind.WALKER), int(ActorKind.PROP)
+ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
 # 1 / mass [1/kg] by ActorKind; a prop does not move
 INVERSE_MASS = np.array(
@@ -31,112 +32,60 @@ INVERSE_MASS = np.array(
 
 
 @kernel
-def _axis_depth(offset, cos, sin, a_cos, a_sin, b_cos, b_sin, a_half, a_side, b_half, b_side):
-    """How far two boxes overlap along the axis (cos, sin); `offset` is their centres' distance."""
-    a_reach = a_half * abs(a_cos * cos + a_sin * sin) + a_side * abs(a_cos * sin - a_sin * cos)
-    b_reach = b_half * abs(b_cos * cos + b_sin * sin) + b_side * abs(b_cos * sin - b_sin * cos)
-    return a_reach + b_reach - abs(offset)
+def speeds_after(ego_speed, ego_weight, ego_along, speed, weight, along):
+    """Speeds of an ego and another body after an inelastic impact; neither falls below zero.
 
-
-@kernel
-def overlap(state, a, b):
-    """How two actors' boxes overlap, seen from above.
-
-    Returns:
-        (depth, x, y): the least distance [m] that parts them, 0 where they are apart, and the unit
-        vector along which `b` would have to move by it.
+    Args:
+        ego_speed, speed: Before it [m/s].
+        ego_weight, weight: Inverse masses [1/kg], not both 0.
+        ego_along, along: Cosines between each heading and the normal from the ego to the other.
     """
-    dx, dy = state.x[b] - state.x[a], state.y[b] - state.y[a]
-    a_half, a_side = state.half_length[a], state.half_width[a]
-    b_half, b_side = state.half_length[b], state.half_width[b]
-    reach = a_half + a_side + b_half + b_side
-    if dx * dx + dy * dy > reach * reach or abs(state.z[a] - state.z[b]) >= SAME_LEVEL_M:
-        return 0.0, 0.0, 0.0
-    a_cos, a_sin = math.cos(state.yaw[a]), math.sin(state.yaw[a])
-    b_cos, b_sin = math.cos(state.yaw[b]), math.sin(state.yaw[b])
-    least, least_x, least_y = math.inf, 0.0, 0.0
-    for axis in range(4):
-        cos, sin = (a_cos, a_sin) if axis < 2 else (b_cos, b_sin)
-        if axis % 2 == 1:
-            cos, sin = -sin, cos
-        offset = dx * cos + dy * sin
-        depth = _axis_depth(
-            offset, cos, sin, a_cos, a_sin, b_cos, b_sin, a_half, a_side, b_half, b_side
-        )
-        if depth <= 0.0:
-            return 0.0, 0.0, 0.0
-        if depth < least:
-            sign = 1.0 if offset >= 0.0 else -1.0
-            least, least_x, least_y = depth, sign * cos, sign * sin
-    return least, least_x, least_y
-
-
-@kernel
-def _shift(state, actor, dx, dy):
-    state.x[actor] += dx
-    state.y[actor] += dy
-
-
-@kernel
-def _part(state, ego, other, depth, nx, ny):
-    """Moves the bodies apart: the walker if it is one, both egos by half, else the ego."""
-    distance = depth + SLOP_M
-    if state.kind[other] == WALKER:
-        _shift(state, other, distance * nx, distance * ny)
-    elif other < state.throttle.shape[0]:
-        _shift(state, ego, -0.5 * distance * nx, -0.5 * distance * ny)
-        _shift(state, other, 0.5 * distance * nx, 0.5 * distance * ny)
-    else:
-        _shift(state, ego, -distance * nx, -distance * ny)
-
-
-@kernel
-def _exchange_speed(state, ego, other, nx, ny):
-    """Inelastic impact along the normal (from ego to other); speeds never fall below zero."""
-    along_ego = math.cos(state.yaw[ego]) * nx + math.sin(state.yaw[ego]) * ny
-    along_other = math.cos(state.yaw[other]) * nx + math.sin(state.yaw[other]) * ny
-    ego_speed, other_speed = state.speed[ego], state.speed[other]
-    closing = ego_speed * along_ego - other_speed * along_other
+    closing = ego_speed * ego_along - speed * along
     if closing <= 0.0:
-        return
-    ego_weight, other_weight = INVERSE_MASS[state.kind[ego]], INVERSE_MASS[state.kind[other]]
-    impulse = closing / (ego_weight + other_weight)
-    ego_after = ego_speed - impulse * ego_weight * along_ego
-    other_after = other_speed + impulse * other_weight * along_other
+        return ego_speed, speed
+    impulse = closing / (ego_weight + weight)
+    ego_after = ego_speed - impulse * ego_weight * ego_along
+    after = speed + impulse * weight * along
     # what would be thrown back stands like a wall instead
-    if other_after < 0.0:
-        other_after, ego_after = 0.0, ego_speed * (1.0 - along_ego * along_ego)
+    if after < 0.0:
+        after, ego_after = 0.0, ego_speed * (1.0 - ego_along * ego_along)
     if ego_after < 0.0:
-        ego_after, other_after = 0.0, other_speed * (1.0 - along_other * along_other)
-    state.speed[ego], state.speed[other] = max(ego_after, 0.0), max(other_after, 0.0)
+        ego_after, after = 0.0, speed * (1.0 - along * along)
+    return max(ego_after, 0.0), max(after, 0.0)
 
 
 @kernel
-def _knock_down(state, ego, walker):
+def _exchange_speed(bodies, ego, other, nx, ny):
+    ego_along = math.cos(bodies.yaw[ego]) * nx + math.sin(bodies.yaw[ego]) * ny
+    along = math.cos(bodies.yaw[other]) * nx + math.sin(bodies.yaw[other]) * ny
+    bodies.speed[ego], bodies.speed[other] = speeds_after(
+        bodies.speed[ego],
+        INVERSE_MASS[bodies.kind[ego]],
+        ego_along,
+        bodies.speed[other],
+        INVERSE_MASS[bodies.kind[other]],
+        along,
+    )
+
+
+@kernel
+def _part(bodies, ego, other, share, dx, dy):
+    """Moves the bodies apart: the ego by `share` of the way, the other by the rest."""
+    bodies.x[ego] -= share * dx
+    bodies.y[ego] -= share * dy
+    bodies.x[other] += (1.0 - share) * dx
+    bodies.y[other] += (1.0 - share) * dy
+
+
+@kernel
+def _knock_down(bodies, walk_waiting, lying_ticks, ego, walker):
     """The walker takes its share of momentum once, then lies, pushed along without weight."""
-    if state.walk_waiting[walker] != DOWN:
-        ego_weight = INVERSE_MASS[state.kind[ego]]
-        state.speed[ego] *= INVERSE_MASS[WALKER] / (INVERSE_MASS[WALKER] + ego_weight)
-    state.speed[walker] = 0.0
-    state.walk_waiting[walker] = DOWN
-    state.still_ticks[walker] = 0
-
-
-@kernel
-def _meet(state, ego, other, out, n):
-    """Resolves one pair; returns (whether they touched, rows in use)."""
-    depth, nx, ny = overlap(state, ego, other)
-    if depth <= 0.0:
-        return False, n
-    if state.kind[other] == WALKER:
-        _knock_down(state, ego, other)
-    else:
-        _exchange_speed(state, ego, other, nx, ny)
-    _part(state, ego, other, depth, nx, ny)
-    n = count_collision(state, ego, other, out, n)
-    if other < state.throttle.shape[0]:
-        n = count_collision(state, other, ego, out, n)
-    return True, n
+    if walk_waiting[walker] != DOWN:
+        ego_weight = INVERSE_MASS[bodies.kind[ego]]
+        bodies.speed[ego] *= INVERSE_MASS[WALKER] / (INVERSE_MASS[WALKER] + ego_weight)
+    bodies.speed[walker] = 0.0
+    walk_waiting[walker] = DOWN
+    lying_ticks[walker] = 0
 
 
 @kernel
@@ -153,19 +102,59 @@ def resolve_contacts(state, out, n):
     Returns:
         The number of rows in use.
     """
-    egos = state.throttle.shape[0]
-    for ego in range(egos):
-        forget_collisions(state, ego)
+    bodies = Bodies(
+        state.kind,
+        state.x,
+        state.y,
+        state.z,
+        state.yaw,
+        state.speed,
+        state.half_length,
+        state.half_width,
+    )
+    memory = CollisionMemory(
+        state.last_collision_actor,
+        state.last_collision_tick,
+        state.collision_places,
+        state.finished,
+    )
+    tick = state.tick[()]
+    before = n
+    for ego in range(memory.finished.size):
+        forget_collisions(memory, ego, tick, bodies.x[ego], bodies.y[ego])
     for _ in range(PASSES):
-        touched = False
-        for ego in range(egos):
-            if state.kind[ego] == ABSENT:
-                continue
-            for other in range(ego + 1, state.kind.shape[0]):
-                if state.kind[other] == ABSENT:
-                    continue
-                hit, n = _meet(state, ego, other, out, n)
-                touched = touched or hit
+        touched, n = _resolve_once(
+            bodies, memory, state.walk_waiting, state.still_ticks, tick, out, n
+        )
         if not touched:
             break
+    count_rows(state.counts, out, before, n)
     return n
+
+
+@kernel
+def _resolve_once(bodies, memory, walk_waiting, lying_ticks, tick, out, n):
+    """Resolves each overlap of an ego once; returns (whether there was one, rows in use)."""
+    touched = False
+    egos = memory.finished.size
+    for ego in range(egos):
+        for other in range(ego + 1, bodies.kind.size):
+            if not may_touch(bodies, ego, other):
+                continue
+            if bodies.kind[other] == ABSENT or bodies.kind[ego] == ABSENT:
+                continue
+            depth, nx, ny = overlap(box_of(bodies, ego), box_of(bodies, other))
+            if depth <= 0.0:
+                continue
+            touched = True
+            share = 0.5 if other < egos else 1.0
+            if bodies.kind[other] == WALKER:
+                _knock_down(bodies, walk_waiting, lying_ticks, ego, other)
+                share = 0.0
+            else:
+                _exchange_speed(bodies, ego, other, nx, ny)
+            _part(bodies, ego, other, share, (depth + SLOP_M) * nx, (depth + SLOP_M) * ny)
+            n = count_collision(memory, bodies, ego, other, tick, out, n)
+            if other < egos:
+                n = count_collision(memory, bodies, other, ego, tick, out, n)
+    return touched, n

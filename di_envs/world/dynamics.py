@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+import numpy as np
+
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
@@ -127,7 +129,7 @@ def locate_ego(state, lanes, ego):
     Lanes more than 2.5 m above or below it do not count, so a bridge is not the road below.
     """
     x, y, z = state.x[ego], state.y[ego], state.z[ego]
-    lane, station, lateral, _distance = nearest_lane(lanes, x, y, z, LOOK_M, DRIVING_MASK)
+    lane, station, lateral, _distance = nearest_lane(lanes, x, y, z, LOOK_M, np.int64(DRIVING_MASK))
     state.lane[ego] = lane
     state.lane_m[ego] = station
     state.lateral_m[ego] = lateral

@@ -13,8 +13,8 @@ ROWS_PER_EGO = 8
 
 
 @kernel
-def record(state, out, n, kind, ego, x, y, z, other, value):
-    """Writes row `n` of `out` (N, COLUMNS), counts the event, and returns `n + 1`.
+def record(out, n, kind, ego, tick, x, y, z, other, value):
+    """Writes row `n` of `out` (N, COLUMNS) and returns `n + 1`.
 
     Raises:
         ValueError: If `out` has no row left: it needs ROWS_PER_EGO for each ego and tick.
@@ -23,11 +23,17 @@ def record(state, out, n, kind, ego, x, y, z, other, value):
         raise ValueError("The event rows are full: give ROWS_PER_EGO rows for each ego and tick.")
     out[n, 0] = kind
     out[n, 1] = ego
-    out[n, 2] = state.tick[()]
+    out[n, 2] = tick
     out[n, 3] = x
     out[n, 4] = y
     out[n, 5] = z
     out[n, 6] = other
     out[n, 7] = value
-    state.counts[ego, kind] += 1
     return n + 1
+
+
+@kernel
+def count_rows(counts, out, begin, end):
+    """Adds the rows [begin, end) of `out` to the egos' `counts` (E, 12)."""
+    for k in range(begin, end):
+        counts[int(out[k, 1]), int(out[k, 0])] += 1

@@ -10,11 +10,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from di_envs.kernels import kernel
-from di_envs.world.lane_keeping import watch_lanes
+from di_envs.town.queries import pose_at
+from di_envs.world.bodies import EgoNow
+from di_envs.world.event_rows import count_rows, record
+from di_envs.world.lane_keeping import LaneMemory, watch_lanes
 from di_envs.world.red_light import detect_red_light
-from di_envs.world.route_end import detect_route_end
-from di_envs.world.stop_sign import detect_stop_sign
+from di_envs.world.route_end import EndMemory, find_route_end
+from di_envs.world.state import EventKind
+from di_envs.world.stop_sign import StopMemory, detect_stop_sign
+
+OUTSIDE_LANES = int(EventKind.OUTSIDE_LANES)
 
 
 @kernel
@@ -59,7 +67,50 @@ def detect_events(state, lanes, signals, routes, ego, out, n):
     """
     if state.finished[ego] != 0:
         return n
-    watch_lanes(state, lanes, routes, ego)
-    n = detect_red_light(state, lanes, signals, ego, out, n)
-    n = detect_stop_sign(state, lanes, signals, ego, out, n)
-    return detect_route_end(state, routes, ego, out, n)
+    # integers of one width, so that what reads them is compiled once
+    now = EgoNow(
+        np.int64(ego),
+        state.tick[()],
+        state.x[ego],
+        state.y[ego],
+        state.z[ego],
+        state.yaw[ego],
+        state.speed[ego],
+        state.half_length[ego],
+        np.int64(state.lane[ego]),
+        state.lane_m[ego],
+    )
+    lane_memory = LaneMemory(
+        state.outside_lane,
+        state.wrong_lane,
+        state.lane_before,
+        state.lane_before_yaw,
+        state.outside_m,
+        state.outside_done_m,
+        state.outside_index,
+    )
+    stop_memory = StopMemory(state.stop_target, state.stop_done, state.stop_affected)
+    end_memory = EndMemory(
+        state.route_done_m, state.deviation_index, state.deviation_m, state.blocked_ticks
+    )
+    before = n
+    lane_yaw = pose_at(lanes, now.lane, now.lane_m)[3] if now.lane >= 0 else 0.0
+    watch_lanes(lanes, routes, now, lane_yaw, lane_memory)
+    n, state.last_red_signal[ego] = detect_red_light(
+        lanes, signals, state.light, now, state.last_red_signal[ego], out, n
+    )
+    n = detect_stop_sign(lanes, signals, now, lane_yaw, stop_memory, out, n)
+    reason = find_route_end(routes, now, end_memory)
+    if reason != 0:
+        n = _end_route(now, reason, lane_memory.outside_m[ego], out, n)
+        state.finished[ego] = reason
+    count_rows(state.counts, out, before, n)
+    return n
+
+
+@kernel
+def _end_route(now, reason, outside_m, out, n):
+    """Records the metres outside lanes, if there are any, and why the route ended."""
+    if outside_m > 0.0:
+        n = record(out, n, OUTSIDE_LANES, now.index, now.tick, now.x, now.y, now.z, -1, outside_m)
+    return record(out, n, reason, now.index, now.tick, now.x, now.y, now.z, -1, 0.0)

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LaneKind
 from di_envs.town.queries import nearest_lane, pose_at, width_at
-from di_envs.world.event_rows import record
 from di_envs.world.progress import is_past
-from di_envs.world.state import EventKind
 
 ALLOWED_OUT_M = 1.3  # beyond the lane's edge, for the ego's centre
 AGAINST_LANE = math.cos(math.radians(120.0))  # leaving a junction this far off the lane's direction
@@ -18,28 +20,32 @@ LANE_JUMP = math.cos(math.radians(150.0))  # between two ticks' lanes: into or o
 WINDOW = 3  # route points looked at beyond the present one
 PARKING_LOOK_M = 10.0  # for a parking lane; further away none can help
 PARKING_MASK = 1 << int(LaneKind.PARKING)
-OUTSIDE_LANES = int(EventKind.OUTSIDE_LANES)
+
+
+class LaneMemory(NamedTuple):
+    """What a state remembers of each ego's lanes; all (E,), see `State`."""
+
+    outside_lane: NDArray[np.int8]
+    wrong_lane: NDArray[np.int8]
+    lane_before: NDArray[np.int32]
+    lane_before_yaw: NDArray[np.float64]
+    outside_m: NDArray[np.float64]
+    outside_done_m: NDArray[np.float64]
+    outside_index: NDArray[np.int32]
 
 
 @kernel
-def _distance_to(state, lanes, ego, lane, station):
-    x, y, z, _yaw = pose_at(lanes, lane, station)
-    dx, dy, dz = x - state.x[ego], y - state.y[ego], z - state.z[ego]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@kernel
-def is_outside_lanes(state, lanes, ego):
+def is_outside_lanes(lanes, ego):
     """Whether the ego's centre is over 1.3 m beyond the nearest driving or parking lane."""
-    lane, station = state.lane[ego], state.lane_m[ego]
     width, distance = 0.0, math.inf
-    if lane >= 0:
-        width = width_at(lanes, lane, station)
-        distance = _distance_to(state, lanes, ego, lane, station)
+    if ego.lane >= 0:
+        width = width_at(lanes, ego.lane, ego.lane_m)
+        x, y, z, _yaw = pose_at(lanes, ego.lane, ego.lane_m)
+        distance = math.sqrt((x - ego.x) ** 2 + (y - ego.y) ** 2 + (z - ego.z) ** 2)
     if distance <= 0.5 * width:  # on its lane: no parking lane could make that an infraction
         return False
     parking, at, _lateral, away = nearest_lane(
-        lanes, state.x[ego], state.y[ego], state.z[ego], PARKING_LOOK_M, PARKING_MASK
+        lanes, ego.x, ego.y, ego.z, PARKING_LOOK_M, np.int64(PARKING_MASK)
     )
     if parking >= 0 and away <= distance:
         distance, width = away, width_at(lanes, parking, at)
@@ -47,50 +53,48 @@ def is_outside_lanes(state, lanes, ego):
 
 
 @kernel
-def _note_wrong_lane(state, lanes, ego):
-    """Follows whether the ego is on a lane against its direction; looks only at lane changes."""
-    lane, before = state.lane[ego], state.lane_before[ego]
-    if lane < 0:
-        return
-    yaw = pose_at(lanes, lane, state.lane_m[ego])[3]
+def _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong):
+    """Whether the ego is on a lane against its direction; looked at only when the lane changes."""
+    lane = ego.lane
     if lanes.junction[lane] >= 0:  # lanes are too tangled there
-        state.wrong_lane[ego] = 0
-    elif before >= 0 and (
-        lanes.road[lane] != lanes.road[before] or lanes.lane_id[lane] != lanes.lane_id[before]
-    ):
-        if lanes.junction[before] >= 0:
-            against = math.cos(yaw - state.yaw[ego]) <= AGAINST_LANE
-            state.wrong_lane[ego] = 1 if against else 0
-        elif math.cos(yaw - state.lane_before_yaw[ego]) <= LANE_JUMP:
-            state.wrong_lane[ego] = 1 - state.wrong_lane[ego]
-        else:  # a change between lanes of one direction clears it, whatever it was
-            state.wrong_lane[ego] = 0
-    state.lane_before[ego] = lane
-    state.lane_before_yaw[ego] = yaw
+        return False
+    if before < 0:
+        return wrong
+    if lanes.road[lane] == lanes.road[before] and lanes.lane_id[lane] == lanes.lane_id[before]:
+        return wrong
+    if lanes.junction[before] >= 0:
+        return math.cos(lane_yaw - ego.yaw) <= AGAINST_LANE
+    # a change between lanes of one direction clears it, whatever it was
+    return math.cos(lane_yaw - before_yaw) <= LANE_JUMP and not wrong
 
 
 @kernel
-def watch_lanes(state, lanes, routes, ego):
-    """Updates the ego's lane flags, and counts the route metres passed while one is up."""
-    state.outside_lane[ego] = 1 if is_outside_lanes(state, lanes, ego) else 0
-    _note_wrong_lane(state, lanes, ego)
-    wrong = state.outside_lane[ego] != 0 or state.wrong_lane[ego] != 0
-    first, end = routes.start[ego], routes.start[ego + 1]
-    now = first + state.outside_index[ego]
+def watch_lanes(lanes, routes, ego, lane_yaw, memory):
+    """Updates the ego's lane flags, and counts the route metres passed while one is up.
+
+    Args:
+        lanes: The town's lanes.
+        routes: The egos' routes.
+        ego: The ego now (`EgoNow`).
+        lane_yaw: Direction of its lane there [rad].
+        memory: `LaneMemory`, changed in place.
+    """
+    e = ego.index
+    wrong = memory.wrong_lane[e] != 0
+    if ego.lane >= 0:
+        before, before_yaw = memory.lane_before[e], memory.lane_before_yaw[e]
+        wrong = _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong)
+        memory.lane_before[e], memory.lane_before_yaw[e] = ego.lane, lane_yaw
+    outside = is_outside_lanes(lanes, ego)
+    memory.wrong_lane[e] = 1 if wrong else 0
+    memory.outside_lane[e] = 1 if outside else 0
+
+    first, end = routes.start[e], routes.start[e + 1]
+    now = first + memory.outside_index[e]
     for point in range(now + 1, min(now + WINDOW + 1, end)):
-        if is_past(routes, point, state.x[ego], state.y[ego]):
-            done = routes.route_m[point] - routes.route_m[first + state.outside_index[ego]]
-            state.outside_index[ego] = point - first
-            state.outside_done_m[ego] += done
-            if wrong:
-                state.outside_m[ego] += done
-
-
-@kernel
-def report_outside_lanes(state, ego, out, n):
-    """Records the metres outside lanes, if there are any, at the route's end."""
-    metres = state.outside_m[ego]
-    if metres <= 0.0:
-        return n
-    x, y, z = state.x[ego], state.y[ego], state.z[ego]
-    return record(state, out, n, OUTSIDE_LANES, ego, x, y, z, -1, metres)
+        if is_past(routes.points, point, ego.x, ego.y):
+            done = routes.route_m[point] - routes.route_m[first + memory.outside_index[e]]
+            memory.outside_index[e] = point - first
+            memory.outside_done_m[e] += done
+            if wrong or outside:
+                memory.outside_m[e] += done

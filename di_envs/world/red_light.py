@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.town.queries import DRIVING_MASK, nearest_lane
@@ -37,54 +39,76 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 @kernel
-def _watched(state, signals, ego, signal):
-    """Whether this light can fine the ego now: red, near, and not the last that did."""
-    if signals.kind[signal] != LIGHT or state.light[signal] != RED:
-        return False
-    dx = signals.box[signal, 0] - state.x[ego]
-    dy = signals.box[signal, 1] - state.y[ego]
-    dz = signals.box[signal, 2] - state.z[ego]
-    near = dx * dx + dy * dy + dz * dz <= WITHIN_M * WITHIN_M
-    return near and signal != state.last_red_signal[ego]
+def _is_near(signals, signal, ego):
+    """Whether the centre of the signal's trigger box is within 15 m of the ego."""
+    dx = signals.box[signal, 0] - ego.x
+    dy = signals.box[signal, 1] - ego.y
+    dz = signals.box[signal, 2] - ego.z
+    return dx * dx + dy * dy + dz * dz <= WITHIN_M * WITHIN_M
 
 
 @kernel
-def _tail_crosses(state, lanes, signals, ego, line):
-    """Whether the ego's tail lies across a stop line, on its lane and in its direction."""
-    cos, sin = math.cos(state.yaw[ego]), math.sin(state.yaw[ego])
-    near = TAIL_FROM * state.half_length[ego]
-    far = state.half_length[ego] + TAIL_BEYOND_M
-    near_x, near_y = state.x[ego] - near * cos, state.y[ego] - near * sin
-    far_x, far_y = state.x[ego] - far * cos, state.y[ego] - far * sin
+def tail_crosses(ego, x, y, yaw, width_m):
+    """Whether the ego's tail lies across the stop line at a pose, in the direction of its lane."""
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    line_cos, line_sin = math.cos(yaw), math.sin(yaw)
+    if cos * line_cos + sin * line_sin <= 0.0:
+        return False
+    near, far = TAIL_FROM * ego.half_length, ego.half_length + TAIL_BEYOND_M
+    side_x, side_y = -line_sin * LINE_HALF_WIDTHS * width_m, line_cos * LINE_HALF_WIDTHS * width_m
+    return segments_cross(
+        ego.x - near * cos,
+        ego.y - near * sin,
+        ego.x - far * cos,
+        ego.y - far * sin,
+        x - side_x,
+        y - side_y,
+        x + side_x,
+        y + side_y,
+    )
 
-    yaw = signals.stop_pose[line, 3]
-    if cos * math.cos(yaw) + sin * math.sin(yaw) <= 0.0:
-        return False
-    reach = LINE_HALF_WIDTHS * signals.stop_width_m[line]
-    side_x, side_y = -math.sin(yaw) * reach, math.cos(yaw) * reach
-    x, y = signals.stop_pose[line, 0], signals.stop_pose[line, 1]
-    if not segments_cross(
-        near_x, near_y, far_x, far_y, x - side_x, y - side_y, x + side_x, y + side_y
-    ):
-        return False
-    tail = nearest_lane(lanes, far_x, far_y, state.z[ego], TAIL_LOOK_M, DRIVING_MASK)[0]
-    stop = signals.stop_lane[line]
+
+@kernel
+def _tail_is_on(lanes, ego, stop):
+    """Whether the far end of the tail is on the road and lane of the stop line."""
+    far = ego.half_length + TAIL_BEYOND_M
+    x, y = ego.x - far * math.cos(ego.yaw), ego.y - far * math.sin(ego.yaw)
+    tail = nearest_lane(lanes, x, y, ego.z, TAIL_LOOK_M, np.int64(DRIVING_MASK))[0]
     same_road = tail >= 0 and lanes.road[tail] == lanes.road[stop]
     return same_road and lanes.lane_id[tail] == lanes.lane_id[stop]
 
 
 @kernel
-def detect_red_light(state, lanes, signals, ego, out, n):
-    """Records the red lights that the ego's tail is crossing; returns the rows in use."""
-    for signal in range(signals.kind.shape[0]):
-        if not _watched(state, signals, ego, signal):
+def detect_red_light(lanes, signals, light, ego, last_signal, out, n):
+    """Records the red lights that the ego's tail is crossing.
+
+    Args:
+        lanes: The town's lanes.
+        signals: The town's signals.
+        light: (S,) what they show.
+        ego: The ego now (`EgoNow`).
+        last_signal: The light that fined it last, which is not looked at; -1 for none.
+        out: (N, 8) event rows.
+        n: Rows in use.
+
+    Returns:
+        (rows in use, the light that fined last).
+    """
+    for signal in range(signals.kind.size):
+        if light[signal] != RED or signals.kind[signal] != LIGHT or signal == last_signal:
             continue
-        for line in range(signals.stop_signal.shape[0]):
-            if signals.stop_signal[line] == signal and _tail_crosses(
-                state, lanes, signals, ego, line
-            ):
-                x, y, z = signals.pose[signal, 0], signals.pose[signal, 1], signals.pose[signal, 2]
-                n = record(state, out, n, RED_LIGHT, ego, x, y, z, signal, 0.0)
-                state.last_red_signal[ego] = signal
+        if not _is_near(signals, signal, ego):
+            continue
+        for line in range(signals.stop_signal.size):
+            if signals.stop_signal[line] != signal:
+                continue
+            pose = signals.stop_pose[line]
+            crosses = tail_crosses(ego, pose[0], pose[1], pose[3], signals.stop_width_m[line])
+            if crosses and _tail_is_on(lanes, ego, signals.stop_lane[line]):
+                pole = signals.pose[signal]
+                n = record(
+                    out, n, RED_LIGHT, ego.index, ego.tick, pole[0], pole[1], pole[2], signal, 0.0
+                )
+                last_signal = signal
                 break
-    return n
+    return n, last_signal

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
-from di_envs.world.event_rows import record
-from di_envs.world.lane_keeping import report_outside_lanes
 from di_envs.world.progress import route_completed
 from di_envs.world.state import TICK_S, EventKind
 
@@ -22,68 +24,69 @@ COMPLETED, DEVIATED = int(EventKind.COMPLETED), int(EventKind.ROUTE_DEVIATION)
 BLOCKED, TIMEOUT = int(EventKind.BLOCKED), int(EventKind.TIMEOUT)
 
 
+class EndMemory(NamedTuple):
+    """What a state remembers for the ends of routes; all (E,), see `State`."""
+
+    route_done_m: NDArray[np.float64]
+    deviation_index: NDArray[np.int32]
+    deviation_m: NDArray[np.float64]
+    blocked_ticks: NDArray[np.int32]
+
+
 @kernel
-def _nearest_ahead(state, routes, ego):
-    """The nearest of the next route points (the later of equals) and its distance [m]."""
-    first = routes.start[ego]
-    now = first + state.deviation_index[ego]
-    nearest, least = now, math.inf
-    for point in range(now, min(now + WINDOW + 1, routes.start[ego + 1])):
-        dx, dy = state.x[ego] - routes.points[point, 0], state.y[ego] - routes.points[point, 1]
+def _nearest_ahead(points, begin, end, x, y):
+    """The nearest of the route points [begin, end), the later of equals, and its distance [m]."""
+    nearest, least = begin, math.inf
+    for point in range(begin, end):
+        dx, dy = x - points[point, 0], y - points[point, 1]
         square = dx * dx + dy * dy
         if square <= least:
             nearest, least = point, square
-    return nearest - first, math.sqrt(least)
+    return nearest, math.sqrt(least)
 
 
 @kernel
-def has_deviated(state, routes, ego):
+def has_deviated(routes, ego, memory):
     """Follows the nearest route point; true over 30 m away, or after too long over 15 m away."""
-    first = routes.start[ego]
-    nearest, distance = _nearest_ahead(state, routes, ego)
+    first, end = routes.start[ego.index], routes.start[ego.index + 1]
+    now = first + memory.deviation_index[ego.index]
+    nearest, distance = _nearest_ahead(routes.points, now, min(now + WINDOW + 1, end), ego.x, ego.y)
     if distance >= SAFE_M:
-        before = routes.route_m[first + state.deviation_index[ego]]
-        state.deviation_m[ego] += routes.route_m[first + nearest] - before
-    state.deviation_index[ego] = nearest
-    length_m = routes.route_m[routes.start[ego + 1] - 1]
-    return distance >= DEVIATION_M or state.deviation_m[ego] > DEVIATION_SHARE * length_m
+        memory.deviation_m[ego.index] += routes.route_m[nearest] - routes.route_m[now]
+    memory.deviation_index[ego.index] = nearest - first
+    allowed_m = DEVIATION_SHARE * routes.route_m[end - 1]
+    return distance >= DEVIATION_M or memory.deviation_m[ego.index] > allowed_m
 
 
 @kernel
-def _is_blocked(state, ego):
-    if state.speed[ego] < BLOCKED_BELOW_MPS:
-        state.blocked_ticks[ego] += 1
-    else:
-        state.blocked_ticks[ego] = 0
-    return state.blocked_ticks[ego] > BLOCKED_TICKS
+def is_blocked(ego, memory):
+    """Counts the ticks that the ego has stood; true after more than 180 s."""
+    standing = ego.speed < BLOCKED_BELOW_MPS
+    ticks = memory.blocked_ticks[ego.index] + 1 if standing else 0
+    memory.blocked_ticks[ego.index] = ticks
+    return ticks > BLOCKED_TICKS
 
 
 @kernel
-def close_route(state, ego, out, n):
-    """Reports the metres outside lanes; for routes that end from outside, as by a failed agent."""
-    return report_outside_lanes(state, ego, out, n)
+def find_route_end(routes, ego, memory):
+    """The EventKind that ends the route in this tick, 0 while it goes on.
 
+    Of several at once, completion comes first, then deviation, blocked, timeout. A completed route
+    is done in full.
 
-@kernel
-def detect_route_end(state, routes, ego, out, n):
-    """Records what ends the route in this tick, at most one event; returns the rows in use.
-
-    Of several at once, completion comes first, then deviation, blocked, timeout.
+    Args:
+        routes: The egos' routes.
+        ego: The ego now (`EgoNow`).
+        memory: `EndMemory`, changed in place.
     """
-    deviated = has_deviated(state, routes, ego)
-    blocked = _is_blocked(state, ego)
-    if route_completed(state, routes, ego):
-        reason = COMPLETED
-        state.route_done_m[ego] = routes.route_m[routes.start[ego + 1] - 1]
-    elif deviated:
-        reason = DEVIATED
-    elif blocked:
-        reason = BLOCKED
-    elif state.tick[()] * TICK_S > routes.timeout_s[ego]:
-        reason = TIMEOUT
-    else:
-        return n
-    n = close_route(state, ego, out, n)
-    state.finished[ego] = reason
-    x, y, z = state.x[ego], state.y[ego], state.z[ego]
-    return record(state, out, n, reason, ego, x, y, z, -1, 0.0)
+    deviated = has_deviated(routes, ego, memory)
+    blocked = is_blocked(ego, memory)
+    done_m = memory.route_done_m[ego.index]
+    if route_completed(routes, ego.index, done_m, ego.x, ego.y, ego.z):
+        memory.route_done_m[ego.index] = routes.route_m[routes.start[ego.index + 1] - 1]
+        return COMPLETED
+    if deviated:
+        return DEVIATED
+    if blocked:
+        return BLOCKED
+    return TIMEOUT if ego.tick * TICK_S > routes.timeout_s[ego.index] else 0

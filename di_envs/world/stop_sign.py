@@ -13,20 +13,33 @@ axes.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import SignalKind
 from di_envs.town.queries import pose_at
+from di_envs.world.bodies import SAME_LEVEL_M
 from di_envs.world.event_rows import record
 from di_envs.world.state import EventKind
 
 NEAR_M = 50.0  # from the sign, beyond which it is not looked at
 STEPS_AHEAD = 20  # lane points of one metre's step that are looked at
 STEP_M = 1.0
+LANE_LOOK_M = 40.0  # at most, from an ego to its lane
 STOOD_BELOW_MPS = 0.1
-SAME_LEVEL_M = 3.0
 
 STOP, STOP_SIGN = int(SignalKind.STOP), int(EventKind.STOP_SIGN)
+
+
+class StopMemory(NamedTuple):
+    """What a state remembers of the stop sign that each ego comes to; all (E,)."""
+
+    target: NDArray[np.int32]  # the sign watched, -1 for none
+    done: NDArray[np.int8]  # the ego stood
+    affected: NDArray[np.int8]  # the ego was in the box around the sign
 
 
 @kernel
@@ -45,26 +58,26 @@ def _inside(x, y, z, centre, extent_x, extent_y):
 
 
 @kernel
-def _is_near(state, signals, ego, sign, extent_x, extent_y):
-    """Cheap necessary conditions for the box to lie on the lane ahead."""
-    x, y, z = state.x[ego], state.y[ego], state.z[ego]
-    dx, dy, dz = signals.pose[sign, 0] - x, signals.pose[sign, 1] - y, signals.pose[sign, 2] - z
+def _may_be_ahead(ego, pole, box, extent_x, extent_y):
+    """Necessary conditions for a sign's box to lie on the lane ahead, quick to check."""
+    dx, dy, dz = pole[0] - ego.x, pole[1] - ego.y, pole[2] - ego.z
     if dx * dx + dy * dy + dz * dz > NEAR_M * NEAR_M:
         return False
-    reach = STEPS_AHEAD * STEP_M + abs(state.lateral_m[ego]) + extent_x + extent_y + 1.0
-    return math.hypot(signals.box[sign, 0] - x, signals.box[sign, 1] - y) < reach
+    # the lane's points start at most the look's width from the ego and reach 20 m
+    reach = STEPS_AHEAD * STEP_M + LANE_LOOK_M + extent_x + extent_y
+    return math.hypot(box[0] - ego.x, box[1] - ego.y) < reach
 
 
 @kernel
-def is_ahead(state, lanes, signals, ego, sign):
+def is_ahead(lanes, signals, ego, sign):
     """Whether the ego, or one of the next 20 m of its lane, is in the sign's trigger box."""
     extent_x, extent_y = _box_extent(signals, sign)
-    if not _is_near(state, signals, ego, sign, extent_x, extent_y):
-        return False
     box = signals.box[sign]
-    if _inside(state.x[ego], state.y[ego], state.z[ego], box, extent_x, extent_y):
+    if not _may_be_ahead(ego, signals.pose[sign], box, extent_x, extent_y):
+        return False
+    if _inside(ego.x, ego.y, ego.z, box, extent_x, extent_y):
         return True
-    lane, station = state.lane[ego], state.lane_m[ego]
+    lane, station = ego.lane, ego.lane_m
     for _ in range(STEPS_AHEAD):
         if lane < 0:
             return False
@@ -72,7 +85,8 @@ def is_ahead(state, lanes, signals, ego, sign):
         if station > lanes.length_m[lane]:
             station -= lanes.length_m[lane]
             link = lanes.successor_start[lane]
-            lane = lanes.successor[link] if link < lanes.successor_start[lane + 1] else -1
+            has_next = link < lanes.successor_start[lane + 1]
+            lane = lanes.successor[link] if has_next else -1
             if lane < 0:
                 return False
         x, y, z, _yaw = pose_at(lanes, lane, station)
@@ -82,38 +96,47 @@ def is_ahead(state, lanes, signals, ego, sign):
 
 
 @kernel
-def _find_sign(state, lanes, signals, ego):
+def _find_sign(lanes, signals, ego, lane_yaw):
     """The first stop sign ahead, -1 where there is none or the ego heads against its lane."""
-    lane = state.lane[ego]
-    if lane < 0:
+    if ego.lane < 0 or math.cos(lane_yaw - ego.yaw) <= 0.0:
         return -1
-    yaw = pose_at(lanes, lane, state.lane_m[ego])[3]
-    if math.cos(yaw - state.yaw[ego]) <= 0.0:
-        return -1
-    for sign in range(signals.kind.shape[0]):
-        if signals.kind[sign] == STOP and is_ahead(state, lanes, signals, ego, sign):
+    for sign in range(signals.kind.size):
+        if signals.kind[sign] == STOP and is_ahead(lanes, signals, ego, sign):
             return sign
     return -1
 
 
 @kernel
-def detect_stop_sign(state, lanes, signals, ego, out, n):
-    """Follows the stop sign ahead and records it when it was run; returns the rows in use."""
-    sign = state.stop_target[ego]
+def detect_stop_sign(lanes, signals, ego, lane_yaw, memory, out, n):
+    """Follows the stop sign ahead and records it when it was run.
+
+    Args:
+        lanes: The town's lanes.
+        signals: The town's signals.
+        ego: The ego now (`EgoNow`).
+        lane_yaw: Direction of its lane there [rad].
+        memory: `StopMemory`, changed in place.
+        out: (N, 8) event rows.
+        n: Rows in use.
+
+    Returns:
+        The number of rows in use.
+    """
+    sign = np.int64(memory.target[ego.index])
     if sign < 0:
-        state.stop_target[ego] = _find_sign(state, lanes, signals, ego)
+        memory.target[ego.index] = _find_sign(lanes, signals, ego, lane_yaw)
         return n
-    if state.speed[ego] < STOOD_BELOW_MPS:
-        state.stop_done[ego] = 1
-    pose = signals.pose[sign]
+    if ego.speed < STOOD_BELOW_MPS:
+        memory.done[ego.index] = 1
+    pole = signals.pose[sign]
     extent_x, extent_y = _box_extent(signals, sign)
-    if _inside(state.x[ego], state.y[ego], state.z[ego], pose, extent_x, extent_y):
-        state.stop_affected[ego] = 1
-    if is_ahead(state, lanes, signals, ego, sign):
+    if _inside(ego.x, ego.y, ego.z, pole, extent_x, extent_y):
+        memory.affected[ego.index] = 1
+    if is_ahead(lanes, signals, ego, sign):
         return n
-    if state.stop_done[ego] == 0 and state.stop_affected[ego] == 1:
-        n = record(state, out, n, STOP_SIGN, ego, pose[0], pose[1], pose[2], sign, 0.0)
-    state.stop_target[ego] = -1
-    state.stop_done[ego] = 0
-    state.stop_affected[ego] = 0
+    if memory.done[ego.index] == 0 and memory.affected[ego.index] == 1:
+        n = record(out, n, STOP_SIGN, ego.index, ego.tick, pole[0], pole[1], pole[2], sign, 0.0)
+    memory.target[ego.index] = -1
+    memory.done[ego.index] = 0
+    memory.affected[ego.index] = 0
     return n

@@ -92,20 +92,17 @@ def test_the_target_is_the_next_one_not_yet_passed():
 
 
 def test_completion_needs_ninety_nine_per_cent_and_ten_metres():
-    state, routes = make_state(), make_routes()  # 200 m
+    routes = make_routes()  # 200 m
     for done, x, expected in ((198.0, 199.0, False), (199.0, 199.0, True), (199.0, 189.9, False)):
-        state.route_done_m[0], state.x[0] = done, x
-        assert route_completed(state, routes, 0) == expected
+        assert route_completed(routes, 0, done, x, 0.0, 0.0) == expected
 
 
 def test_the_end_on_a_bridge_is_not_reached_from_below():
     points = straight(*range(201))
     points[:, 2] = 10.0
-    state, routes = make_state(), make_routes(points)
-    state.route_done_m[0], state.x[0] = 200.0, 199.5
-    assert not route_completed(state, routes, 0)
-    state.z[0] = 10.0
-    assert route_completed(state, routes, 0)
+    routes = make_routes(points)
+    assert not route_completed(routes, 0, 200.0, 199.5, 0.0, 0.0)
+    assert route_completed(routes, 0, 200.0, 199.5, 0.0, 10.0)
 
 
 def test_a_finished_route_makes_no_more_progress():

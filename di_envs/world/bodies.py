@@ -1,0 +1,110 @@
+# mypy: disallow_untyped_defs=False
+"""Boxes of actors, and narrow views of a state.
+
+A kernel that takes the whole state costs about a second to compile, so inner kernels take only
+the arrays and numbers that they read.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.kernels import kernel
+
+SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels
+
+
+class Bodies(NamedTuple):
+    """The part of a state that says where everybody is; all (A,)."""
+
+    kind: NDArray[np.int8]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    half_length: NDArray[np.float64]
+    half_width: NDArray[np.float64]
+
+
+class Box(NamedTuple):
+    """One body: its pose and size."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    half_length: float
+    half_width: float
+
+
+class EgoNow(NamedTuple):
+    """What the event rules read of an ego in a tick."""
+
+    index: int
+    tick: int
+    x: float
+    y: float
+    z: float
+    yaw: float
+    speed: float
+    half_length: float
+    lane: int  # nearest driving lane, -1 for none
+    lane_m: float
+
+
+@kernel
+def box_of(bodies, actor):
+    """The box of one actor."""
+    return Box(
+        bodies.x[actor],
+        bodies.y[actor],
+        bodies.z[actor],
+        bodies.yaw[actor],
+        bodies.half_length[actor],
+        bodies.half_width[actor],
+    )
+
+
+@kernel
+def may_touch(bodies, a, b):
+    """Whether two actors are so near each other that their boxes might overlap."""
+    dx, dy = bodies.x[b] - bodies.x[a], bodies.y[b] - bodies.y[a]
+    reach = bodies.half_length[a] + bodies.half_width[a]
+    reach += bodies.half_length[b] + bodies.half_width[b]
+    return dx * dx + dy * dy <= reach * reach and abs(bodies.z[b] - bodies.z[a]) < SAME_LEVEL_M
+
+
+@kernel
+def overlap(a, b):
+    """How two boxes overlap, seen from above, by separating axes.
+
+    Returns:
+        (depth, x, y): the least distance [m] that parts them, 0 where they are apart, and the unit
+        vector along which `b` would have to move by it.
+    """
+    dx, dy = b.x - a.x, b.y - a.y
+    a_cos, a_sin, b_cos, b_sin = math.cos(a.yaw), math.sin(a.yaw), math.cos(b.yaw), math.sin(b.yaw)
+    c, s = abs(a_cos * b_cos + a_sin * b_sin), abs(a_sin * b_cos - a_cos * b_sin)
+    least, least_x, least_y = math.inf, 0.0, 0.0
+    for axis in range(4):
+        if axis < 2:
+            cos, sin, own, turned, other = a_cos, a_sin, a, b, axis
+        else:
+            cos, sin, own, turned, other = b_cos, b_sin, b, a, axis - 2
+        reach = own.half_length + turned.half_length * c + turned.half_width * s
+        if other == 1:
+            cos, sin = -sin, cos
+            reach = own.half_width + turned.half_length * s + turned.half_width * c
+        offset = dx * cos + dy * sin
+        depth = reach - abs(offset)
+        if depth <= 0.0:
+            return 0.0, 0.0, 0.0
+        if depth < least:
+            sign = 1.0 if offset >= 0.0 else -1.0
+            least, least_x, least_y = depth, sign * cos, sign * sin
+    return least, least_x, least_y
