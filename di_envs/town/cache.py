@@ -67,7 +67,8 @@ def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | Non
     """The town of a key, or None where there is no readable one."""
     path = folder / f"{key}.npz"
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # Opened here: np.load would leave a file open that turns out to be no archive.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             about = json.loads(str(stored["about"]))
             arrays = {
                 part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})

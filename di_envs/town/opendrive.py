@@ -364,12 +364,11 @@ def _crosswalks(road: Element) -> tuple[CrosswalkRecord, ...]:
             continue
         local = [[_number(c, k, 0.0) for k in ("u", "v", "z")] for c in outline.iter("cornerLocal")]
         along = [[_number(c, k, 0.0) for k in ("s", "t", "dz")] for c in outline.iter("cornerRoad")]
-        heading = _number(e, "hdg", 0.0) + (np.pi if e.get("orientation") == "-" else 0.0)
         records.append(
             CrosswalkRecord(
                 s=_number(e, "s", 0.0),
                 t=_number(e, "t", 0.0),
-                heading=heading,
+                heading=_number(e, "hdg", 0.0),
                 z_offset=_number(e, "zOffset", 0.0),
                 corners=np.array(local or along, dtype=np.float64).reshape(-1, 3),
                 on_road=not local,
