@@ -48,9 +48,7 @@ LANES = (
     LaneSpec(
         start=(20, 6.25), end=(60, 6.25), road=0, lane_id=-3, kind=LaneKind.PARKING, width=2.0
     ),
-    LaneSpec(
-        start=(0, 10), end=(100, 10), road=0, lane_id=-4, kind=LaneKind.SIDEWALK, width=2.0
-    ),
+    LaneSpec(start=(0, 10), end=(100, 10), road=0, lane_id=-4, kind=LaneKind.SIDEWALK, width=2.0),
     LaneSpec(start=(50, -60), end=(50, 60), road=3, lane_id=-1, z=10.0),
 )
 
