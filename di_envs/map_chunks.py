@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.town.lanes import LaneKind, Lanes
 
 POINTS = 10  # points of a polyline
@@ -32,6 +33,7 @@ class MapKind(IntEnum):
     SOLID_LINE = 3  # a lane's edge that must not be crossed
 
 
+@by_reference
 class MapChunks(NamedTuple):
     """C polylines of `POINTS` points each, in the world frame, and a grid over the town."""
 

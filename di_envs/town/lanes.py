@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
+
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
 Float64 = NDArray[np.float64]
@@ -38,14 +40,16 @@ class Turn(IntEnum):
     STRAIGHT = 3
 
 
+@by_reference
 class Lanes(NamedTuple):
     """Arrays over L lanes, P points, N successor links, C conflicts."""
 
     # (L,) one row a lane
     kind: Int8  # LaneKind
     road: Int32  # index into Town.road_names
-    section: Int32  # OpenDRIVE lane section within the road
-    lane_id: Int32  # OpenDRIVE lane id
+    # Lane sections through which a road's driving lanes go on one to one are one lane here
+    section: Int32  # OpenDRIVE lane section within the road, the first of those joined
+    lane_id: Int32  # OpenDRIVE lane id in that section
     junction: Int32  # index into Town.junction_names, -1 outside junctions
     turn: Int8  # Turn, for driving lanes inside junctions
     length_m: Float64
@@ -101,12 +105,15 @@ class LightState(IntEnum):
     RED = 3
 
 
+@by_reference
 class Signals(NamedTuple):
     """Signal heads (S, one an arm of a junction) and the stop lines that they control (K)."""
 
     kind: Int8  # (S,) SignalKind
     junction: Int32  # (S,) index into Town.junction_names
-    group: Int32  # (S,) turn of a light within its junction: groups 0, 1, … take turns; -1 for signs
+    group: (
+        Int32  # (S,) turn of a light within its junction: groups 0, 1, … take turns; -1 for signs
+    )
     pose: Float64  # (S, 4) x, y, z, yaw of the pole's foot; yaw is that of the traffic it faces
     box: Float64  # (S, 6) trigger box: centre x, y, z, yaw, half length (along yaw), half width
     stop_signal: Int32  # (K,) signal of a stop line
@@ -116,6 +123,7 @@ class Signals(NamedTuple):
     groups: Int32  # (J,) number of light groups of each junction, 0 where it has no lights
 
 
+@by_reference
 class Crosswalks(NamedTuple):
     """Crosswalks (X): a strip from a kerb to the other, and the driving lanes below it (Y)."""
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from di_envs.bundles import by_reference
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
@@ -17,6 +18,7 @@ from di_envs.world.state import HISTORY_LENGTH, TICK_S
 LOOK_M = 40.0  # for a lane; an ego this far from all of them has left its route too
 
 
+@by_reference
 class EgoParameters(NamedTuple):
     """`EgoModel` for kernels: the same numbers under the same names."""
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.town.queries import project_to_lane
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind
@@ -22,6 +23,7 @@ NO_LEADER_M = 1e9
 _ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
 
+@by_reference
 class Occupancy(NamedTuple):
     """Scratch of one tick: bodies as linked lists by lane, ordered by their rear stations."""
 

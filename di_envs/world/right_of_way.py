@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LightState, SignalKind, Turn
 from di_envs.town.queries import project_to_lane
@@ -33,6 +34,7 @@ _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 _LEFT = int(Turn.LEFT)
 
 
+@by_reference
 class Requests(NamedTuple):
     """Scratch of one tick: what each vehicle approaches, and who asks to enter."""
 
@@ -116,8 +118,9 @@ def _crosses_holder(occupancy, state, lanes, way, actor):
             continue
         holder = occupancy.holder[other]
         while holder >= 0:
-            if holder != actor and _rear_on(state, lanes, holder, other) < (
-                lanes.conflict_other_end_m[k]
+            if (
+                holder != actor
+                and _rear_on(state, lanes, holder, other) < (lanes.conflict_other_end_m[k])
             ):
                 return True
             holder = occupancy.next_holder[holder]

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
+
 TICK_S = 0.05  # 20 Hz, as in the CARLA Leaderboard
 PATH_LANES = 6  # lanes ahead that a vehicle has chosen, its own first
 SPEED_HISTORY = 4  # past speeds in an observation, at 0.5 s, 1 s, …
@@ -51,6 +53,7 @@ class EventKind(IntEnum):
     COMPLETED = 10
 
 
+@by_reference
 class State(NamedTuple):
     """Views into one world's record; see `state_dtype` for shapes and meanings."""
 
@@ -73,7 +76,9 @@ class State(NamedTuple):
     lateral_m: NDArray[np.float64]  # offset from the lane's centre, positive to the right
     # vehicles (A,), unused by the rest
     path: NDArray[np.int32]  # (A, PATH_LANES) lanes ahead, own lane first, -1 at the end
-    previous_lane: NDArray[np.int32]  # the lane left last (its tail may still be on it), -1 for none
+    previous_lane: NDArray[
+        np.int32
+    ]  # the lane left last (its tail may still be on it), -1 for none
     changing_from: NDArray[np.int32]  # lane that a lane change leaves, -1 when none is under way
     change_start_tick: NDArray[np.int64]
     grant: NDArray[np.int32]  # junction lane that the vehicle may enter or is on, -1 for none
@@ -101,7 +106,9 @@ class State(NamedTuple):
     route_index: NDArray[np.int32]  # route point reached
     route_done_m: NDArray[np.float64]  # metres of the dense route completed
     target_index: NDArray[np.int32]  # next target point, an index into the plan's targets
-    occupied: NDArray[np.int32]  # (E, OCCUPIED_LANES) driving lanes below the ego's box, -1 for none
+    occupied: NDArray[
+        np.int32
+    ]  # (E, OCCUPIED_LANES) driving lanes below the ego's box, -1 for none
     finished: NDArray[np.int8]  # EventKind that ended the route, 0 while it goes on
     # egos (E,): what the events remember
     last_collision_actor: NDArray[np.int32]
@@ -191,9 +198,15 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
 
 def views_of(record: NDArray[np.void]) -> State:
     """Named views into a world's record, a one-element array: they share its memory."""
-    return State(*(record[name][0] if record[name].ndim > 1 else record[name].reshape(()) for name in State._fields))
+    return State(
+        *(
+            record[name][0] if record[name].ndim > 1 else record[name].reshape(())
+            for name in State._fields
+        )
+    )
 
 
+@by_reference
 class Routes(NamedTuple):
     """The egos' plans for kernels, one after the other: ego e has points [start[e], start[e + 1])."""
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.world.contact import resolve_contacts
@@ -27,6 +28,7 @@ from di_envs.world.walkers import mark_busy_crosswalks, move_walkers
 _ABSENT = int(ActorKind.ABSENT)
 
 
+@by_reference
 class Scenery(NamedTuple):
     """What does not change in an episode."""
 
@@ -39,6 +41,7 @@ class Scenery(NamedTuple):
     ego_model: EgoParameters
 
 
+@by_reference
 class Scratch(NamedTuple):
     """Working memory of a tick: nothing in it outlives the tick."""
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, keyed_hash
 from di_envs.town.lanes import LaneKind
@@ -47,6 +48,7 @@ _DRIVING = int(LaneKind.DRIVING)
 _TURN_STREAM = int(Stream.TRAFFIC_TURN)
 
 
+@by_reference
 class Leaders(NamedTuple):
     """Scratch of one tick: the body ahead of each vehicle on its path."""
 
@@ -114,7 +116,14 @@ def find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end):
         speed = state.speed[actor]
         look = 25.0 + 2.0 * speed + speed * speed / 6.0
         gap, leader_speed, leader = find_leader(
-            occupancy, lanes, tables, state.path[actor], actor, s, s + state.half_length[actor], look
+            occupancy,
+            lanes,
+            tables,
+            state.path[actor],
+            actor,
+            s,
+            s + state.half_length[actor],
+            look,
         )
         leaders.gap_m[actor] = gap
         leaders.speed[actor] = leader_speed
@@ -188,9 +197,7 @@ def choose_speed(state, lanes, tables, leaders, requests, busy, egos, actor):
     acceleration = idm_acceleration(speed, desired, gap, leader_speed)
     cap = NO_LEADER_M
     if gap < NO_LEADER_M:
-        leader_braking = (
-            EMERGENCY_BRAKING_MPS2 if leaders.actor[actor] < egos else MAX_BRAKING_MPS2
-        )
+        leader_braking = EMERGENCY_BRAKING_MPS2 if leaders.actor[actor] < egos else MAX_BRAKING_MPS2
         cap = safe_speed(gap - SAFE_GAP_M, leader_speed, MAX_BRAKING_MPS2, leader_braking)
     line = _busy_crosswalk_gap(state, lanes, tables, busy, actor)
     if requests.way[actor] >= 0 and state.grant[actor] != requests.way[actor]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.town.lanes import LaneKind
 from di_envs.town.town import Town
 
@@ -15,6 +16,7 @@ SLOWING_MPS2 = 2.0  # with which they slow down for a bend ahead
 SLOWEST_BEND_MPS = 3.0
 
 
+@by_reference
 class TrafficTables(NamedTuple):
     """Arrays over the lanes L, points P and crosswalks X of a town."""
 

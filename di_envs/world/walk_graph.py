@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, SignalKind, Signals
 from di_envs.town.town import Town
 from di_envs.world.lane_clearance import clearances
@@ -31,6 +32,7 @@ STOP_LINE_M = 25.0  # from a crosswalk, within which a stop line guards it
 Line = NDArray[np.float64]  # (N, 3) x, y, z
 
 
+@by_reference
 class WalkGraph(NamedTuple):
     """Arrays over edges E, their points P, links N, crosswalks X, approaches V and lights T."""
 
