@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -86,7 +87,8 @@ def episodes(draw):
 @given(episodes())
 def test_an_episodes_return_is_its_driving_score_in_metres(steps):
     rewards = [
-        sum(reward_terms(a, b, RULES_1_0).values()) for a, b in zip(steps, steps[1:], strict=False)
+        sum(reward_terms(before, after, RULES_1_0).values())
+        for before, after in itertools.pairwise(steps)
     ]
     assert math.fsum(rewards) == pytest.approx(score_metres(steps[-1], RULES_1_0), abs=1e-9)
 

@@ -1,1 +1,1 @@
-"""The world: its state as a value, and the kernels that move it; the only place where time moves."""
+"""The world: its state as a value, and the kernels that move it; here alone time moves."""
