@@ -32,6 +32,7 @@ READER_MODULES = (
     "map_signals",
     "network",
     "opendrive",
+    "opendrive_records",
     "queries",
     "reference_line",
     "sampling",

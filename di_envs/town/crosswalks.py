@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import Crosswalks, LaneKind, Lanes
-from di_envs.town.opendrive import CrosswalkRecord, OpenDrive
+from di_envs.town.opendrive_records import CrosswalkRecord, OpenDrive
 from di_envs.town.sampling import LaneGeometry
 
 Float64 = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import LaneKind
-from di_envs.town.opendrive import Connection, OpenDrive, RoadLink, RoadRecord
+from di_envs.town.opendrive_records import Connection, OpenDrive, RoadLink, RoadRecord
 from di_envs.town.stretches import Record, Stretch
 
 Int32 = NDArray[np.int32]

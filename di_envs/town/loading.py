@@ -11,7 +11,8 @@ from di_envs.town.crosswalks import find_crosswalks
 from di_envs.town.lanes import Lanes
 from di_envs.town.map_signals import heads_in_map
 from di_envs.town.network import build_lanes, junction_names
-from di_envs.town.opendrive import OpenDrive, read_opendrive
+from di_envs.town.opendrive import read_opendrive
+from di_envs.town.opendrive_records import OpenDrive
 from di_envs.town.sampling import LaneGeometry
 from di_envs.town.sidecar import guessed_heads, heads_of_sidecar, read_sidecar
 from di_envs.town.signals import Head, assemble_signals

@@ -13,7 +13,7 @@ import numpy as np
 
 from di_envs.town.arms import approached_junction
 from di_envs.town.lanes import LaneKind, Lanes, SignalKind
-from di_envs.town.opendrive import OpenDrive, RoadRecord, SignalRecord
+from di_envs.town.opendrive_records import OpenDrive, RoadRecord, SignalRecord
 from di_envs.town.sampling import LaneGeometry
 from di_envs.town.signals import Head, ordered
 from di_envs.town.stretches import Stretch

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from di_envs.town.conflicts import find_conflicts
 from di_envs.town.lanes import LaneKind, Lanes, Turn
 from di_envs.town.links import as_ranges, find_successors, reversed_links
-from di_envs.town.opendrive import OpenDrive
+from di_envs.town.opendrive_records import OpenDrive
 from di_envs.town.sampling import LaneGeometry, Samples, sample_lanes
 from di_envs.town.stretches import Stretch, find_stretches
 

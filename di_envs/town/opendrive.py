@@ -8,18 +8,26 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.town.lanes import LaneKind
-
-Float64 = NDArray[np.float64]
+from di_envs.town.opendrive_records import (
+    GEOMETRY_SHAPES,
+    Connection,
+    CrosswalkRecord,
+    Float64,
+    GeometryRecord,
+    LaneRecord,
+    OpenDrive,
+    RoadLink,
+    RoadRecord,
+    SectionRecord,
+    SignalRecord,
+)
 
 GEO_ORIGIN = (42.0, 2.0)  # CARLA's default where a map has no geoReference [deg]
-GEOMETRY_SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 _LANE_KINDS = {
     "driving": LaneKind.DRIVING,
     "bidirectional": LaneKind.DRIVING,
@@ -30,118 +38,6 @@ _LANE_KINDS = {
     "biking": LaneKind.BIKING,
 }
 _SPEED_UNITS_MPS = {None: 1.0, "m/s": 1.0, "mph": 0.44704, "km/h": 1.0 / 3.6}
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class LaneRecord:
-    """One lane of one section."""
-
-    lane_id: int
-    kind: LaneKind
-    widths: Float64  # (n, 5) station, a, b, c, d
-    predecessors: tuple[int, ...]
-    successors: tuple[int, ...]
-    # (station, crossed towards greater ids, crossed towards smaller ids) of the outer road mark
-    marks: tuple[tuple[float, bool, bool], ...]
-    speeds: tuple[tuple[float, float], ...]  # (station, m/s)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class SectionRecord:
-    """A stretch of road with the same lanes, centre lane included."""
-
-    begin: float
-    end: float
-    lanes: dict[int, LaneRecord]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RoadLink:
-    """What one end of a road joins; `at_start` says which end of a road it is."""
-
-    is_junction: bool
-    element_id: str
-    at_start: bool
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class GeometryRecord:
-    """One piece of a reference line: `shape` is one of GEOMETRY_SHAPES."""
-
-    shape: str
-    begin: float
-    length: float
-    x: float
-    y: float
-    heading: float
-    parameters: tuple[float, ...]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class SignalRecord:
-    """A signal, or a reference to one from another road (`is_reference`)."""
-
-    signal_id: str
-    is_reference: bool
-    type: str
-    name: str
-    s: float
-    t: float
-    z_offset: float
-    h_offset: float
-    orientation: str  # "+", "-" or "none"
-    validity: tuple[tuple[int, int], ...]  # (from lane, to lane)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class CrosswalkRecord:
-    """A crosswalk's outline; corners are local (u, v) or along the road (s, t)."""
-
-    s: float
-    t: float
-    heading: float
-    z_offset: float
-    corners: Float64  # (n, 3) u, v, z or s, t, dz
-    on_road: bool  # corners are (s, t)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RoadRecord:
-    """A road; `junction` is None outside junctions."""
-
-    road_id: str
-    length: float
-    junction: str | None
-    right_hand: bool
-    predecessor: RoadLink | None
-    successor: RoadLink | None
-    speeds: tuple[tuple[float, float], ...]  # (station, m/s)
-    geometry: tuple[GeometryRecord, ...]
-    elevation: Float64  # (n, 5)
-    lane_offset: Float64  # (n, 5)
-    sections: tuple[SectionRecord, ...]
-    signals: tuple[SignalRecord, ...]
-    crosswalks: tuple[CrosswalkRecord, ...]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Connection:
-    """A way through a junction."""
-
-    incoming_road: str
-    connecting_road: str
-    at_start: bool  # it enters the connecting road at its start
-    lane_links: tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class OpenDrive:
-    """A whole file."""
-
-    roads: tuple[RoadRecord, ...]
-    junctions: dict[str, tuple[Connection, ...]]
-    light_order: dict[str, tuple[int, int]]  # signal id -> (sequence, place) of its controller
-    geo_origin: tuple[float, float]
 
 
 def read_opendrive(text: str | bytes, source: str) -> OpenDrive:

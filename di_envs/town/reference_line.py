@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.town.opendrive import GEOMETRY_SHAPES, GeometryRecord
+from di_envs.town.opendrive_records import GEOMETRY_SHAPES, GeometryRecord
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]

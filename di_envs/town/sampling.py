@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.town.opendrive import LaneRecord, OpenDrive
+from di_envs.town.opendrive_records import LaneRecord, OpenDrive
 from di_envs.town.reference_line import Breakpoints, Cubics, ReferenceLines
 from di_envs.town.stretches import Record, Stretch
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from di_envs.town.lanes import LaneKind
-from di_envs.town.opendrive import OpenDrive, RoadRecord, SectionRecord
+from di_envs.town.opendrive_records import OpenDrive, RoadRecord, SectionRecord
 
 MINIMUM_LENGTH = 0.01  # m; shorter leftovers of lanes that are not driven on are dropped
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from di_envs.town.opendrive import GeometryRecord
+from di_envs.town.opendrive_records import GeometryRecord
 from di_envs.town.reference_line import Breakpoints, Cubics, ReferenceLines
 
 
