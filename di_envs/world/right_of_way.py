@@ -308,9 +308,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         approach = state.path[actor, requests.way_step[actor] - 1]
         _note_stop(state, lanes, signals, actor, approach, distance, tick)
         if must_stop(state, lanes, signals, actor, approach, distance):
-            if state.grant[actor] == way and (
-                distance > speed * speed / (2.0 * YELLOW_BRAKING_MPS2) + 0.5
-            ):
+            if state.grant[actor] == way and _can_stop(speed, distance):
                 state.grant[actor] = -1
             continue
         if state.grant[actor] >= 0 or _waits_behind(state, ahead, actor, distance):
@@ -322,6 +320,14 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         requests.queue[asking] = actor
         asking += 1
     give_grants(requests, occupancy, state, lanes, signals, egos, asking)
+
+
+@kernel
+def _can_stop(speed, distance):
+    """Whether a vehicle can still stop before its line when the light turns yellow."""
+    if speed < 1.0:
+        return distance > 0.1
+    return distance > speed * speed / (2.0 * YELLOW_BRAKING_MPS2) + 0.5
 
 
 @kernel
@@ -349,9 +355,12 @@ def _release_grant(state, lanes, actor):
     lane = state.lane[actor]
     if lane == grant or lanes.junction[lane] == lanes.junction[grant]:
         return
-    for step in range(PATH_LANES):
-        if state.path[actor, step] == grant:
-            return  # still ahead
+    for step in range(1, PATH_LANES):
+        ahead = state.path[actor, step]
+        if ahead < 0 or lanes.junction[ahead] >= 0:
+            if ahead == grant:
+                return  # still ahead (a path may come back to a junction: only the next counts)
+            break
     if state.lane_m[actor] >= state.half_length[actor]:
         state.grant[actor] = -1
         state.stopped_at[actor] = -1

@@ -45,26 +45,33 @@ class LineWatch:
         self.reds: list[tuple[int, int]] = []
         self.unstopped: list[tuple[int, int]] = []
         self.crossings = 0
-        self.before: dict[int, tuple[int, float]] = {}
+        self.before: dict[int, int] = {}
         self.stopped: dict[int, int] = {}
 
     def look(self, state: State, vehicles: range) -> None:
-        lanes, signals = self.town.lanes, self.town.signals
         for actor in vehicles:
-            lane = int(state.lane[actor])
-            front = float(state.lane_m[actor] + state.half_length[actor] - lanes.length_m[lane])
-            line = int(lanes.stop_line[lane])
-            if line >= 0 and -4.0 < front <= 0.0 and state.speed[actor] < 0.1:
+            lane, room = self._front(state, actor)
+            line = int(self.town.lanes.stop_line[lane])
+            if line >= 0 and room < 4.0 and state.speed[actor] < 0.1:
                 self.stopped[actor] = line
-            if actor in self.before:
-                old_line, old_front = self.before[actor]
-                moved = front if lane == old_line else 1.0
-                old = int(lanes.stop_line[old_line])
-                if old >= 0 and old_front <= 0.0 < moved and state.changing_from[actor] < 0:
-                    self._cross(actor, old, state)
-            self.before[actor] = (lane, front)
+            before = self.before.get(actor, lane)
+            if before != lane and self.town.lanes.junction[lane] >= 0:
+                self._cross(actor, int(self.town.lanes.stop_line[before]), state)
+            self.before[actor] = lane
+
+    def _front(self, state: State, actor: int) -> tuple[int, float]:
+        """The lane on which a vehicle's front is, and how far that is from the lane's end."""
+        lengths = self.town.lanes.length_m
+        front = float(state.lane_m[actor] + state.half_length[actor])
+        for lane in state.path[actor].tolist():
+            if front <= lengths[lane]:
+                break
+            front -= float(lengths[lane])
+        return lane, float(lengths[lane]) - front
 
     def _cross(self, actor: int, line: int, state: State) -> None:
+        if line < 0:
+            return
         signal = int(self.town.signals.stop_signal[line])
         tick = int(state.tick)
         self.crossings += 1
