@@ -1,34 +1,14 @@
 # mypy: disallow_untyped_defs=False
-"""Boxes of actors, and narrow views of a state.
-
-A kernel that takes the whole state costs about a second to compile, so inner kernels take only
-the arrays and numbers that they read.
-"""
+"""Boxes of actors: how they overlap, and what the event rules read of an ego."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from di_envs.kernels import kernel
 
 SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels
-
-
-class Bodies(NamedTuple):
-    """The part of a state that says where everybody is; all (A,)."""
-
-    kind: NDArray[np.int8]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    z: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    half_length: NDArray[np.float64]
-    half_width: NDArray[np.float64]
 
 
 class Box(NamedTuple):
@@ -58,25 +38,25 @@ class EgoNow(NamedTuple):
 
 
 @kernel
-def box_of(bodies, actor):
+def box_of(state, actor):
     """The box of one actor."""
     return Box(
-        bodies.x[actor],
-        bodies.y[actor],
-        bodies.z[actor],
-        bodies.yaw[actor],
-        bodies.half_length[actor],
-        bodies.half_width[actor],
+        state.x[actor],
+        state.y[actor],
+        state.z[actor],
+        state.yaw[actor],
+        state.half_length[actor],
+        state.half_width[actor],
     )
 
 
 @kernel
-def may_touch(bodies, a, b):
+def may_touch(state, a, b):
     """Whether two actors are so near each other that their boxes might overlap."""
-    dx, dy = bodies.x[b] - bodies.x[a], bodies.y[b] - bodies.y[a]
-    reach = bodies.half_length[a] + bodies.half_width[a]
-    reach += bodies.half_length[b] + bodies.half_width[b]
-    return dx * dx + dy * dy <= reach * reach and abs(bodies.z[b] - bodies.z[a]) < SAME_LEVEL_M
+    dx, dy = state.x[b] - state.x[a], state.y[b] - state.y[a]
+    reach = state.half_length[a] + state.half_width[a]
+    reach += state.half_length[b] + state.half_width[b]
+    return dx * dx + dy * dy <= reach * reach and abs(state.z[b] - state.z[a]) < SAME_LEVEL_M
 
 
 @kernel

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from di_envs.kernels import kernel
-from di_envs.world.bodies import Bodies, box_of, may_touch, overlap
-from di_envs.world.collisions import CollisionMemory, count_collision, forget_collisions
+from di_envs.world.bodies import box_of, may_touch, overlap
+from di_envs.world.collisions import count_collision, forget_collisions
 from di_envs.world.event_rows import count_rows
 from di_envs.world.state import ActorKind
 
@@ -55,37 +55,37 @@ def speeds_after(ego_speed, ego_weight, ego_along, speed, weight, along):
 
 
 @kernel
-def _exchange_speed(bodies, ego, other, nx, ny):
-    ego_along = math.cos(bodies.yaw[ego]) * nx + math.sin(bodies.yaw[ego]) * ny
-    along = math.cos(bodies.yaw[other]) * nx + math.sin(bodies.yaw[other]) * ny
-    bodies.speed[ego], bodies.speed[other] = speeds_after(
-        bodies.speed[ego],
-        INVERSE_MASS[bodies.kind[ego]],
+def _exchange_speed(state, ego, other, nx, ny):
+    ego_along = math.cos(state.yaw[ego]) * nx + math.sin(state.yaw[ego]) * ny
+    along = math.cos(state.yaw[other]) * nx + math.sin(state.yaw[other]) * ny
+    state.speed[ego], state.speed[other] = speeds_after(
+        state.speed[ego],
+        INVERSE_MASS[state.kind[ego]],
         ego_along,
-        bodies.speed[other],
-        INVERSE_MASS[bodies.kind[other]],
+        state.speed[other],
+        INVERSE_MASS[state.kind[other]],
         along,
     )
 
 
 @kernel
-def _part(bodies, ego, other, share, dx, dy):
+def _part(state, ego, other, share, dx, dy):
     """Moves the bodies apart: the ego by `share` of the way, the other by the rest."""
-    bodies.x[ego] -= share * dx
-    bodies.y[ego] -= share * dy
-    bodies.x[other] += (1.0 - share) * dx
-    bodies.y[other] += (1.0 - share) * dy
+    state.x[ego] -= share * dx
+    state.y[ego] -= share * dy
+    state.x[other] += (1.0 - share) * dx
+    state.y[other] += (1.0 - share) * dy
 
 
 @kernel
-def _knock_down(bodies, walk_waiting, lying_ticks, ego, walker):
+def _knock_down(state, ego, walker):
     """The walker takes its share of momentum once, then lies, pushed along without weight."""
-    if walk_waiting[walker] != DOWN:
-        ego_weight = INVERSE_MASS[bodies.kind[ego]]
-        bodies.speed[ego] *= INVERSE_MASS[WALKER] / (INVERSE_MASS[WALKER] + ego_weight)
-    bodies.speed[walker] = 0.0
-    walk_waiting[walker] = DOWN
-    lying_ticks[walker] = 0
+    if state.walk_waiting[walker] != DOWN:
+        ego_weight = INVERSE_MASS[state.kind[ego]]
+        state.speed[ego] *= INVERSE_MASS[WALKER] / (INVERSE_MASS[WALKER] + ego_weight)
+    state.speed[walker] = 0.0
+    state.walk_waiting[walker] = DOWN
+    state.still_ticks[walker] = 0
 
 
 @kernel
@@ -102,30 +102,11 @@ def resolve_contacts(state, out, n):
     Returns:
         The number of rows in use.
     """
-    bodies = Bodies(
-        state.kind,
-        state.x,
-        state.y,
-        state.z,
-        state.yaw,
-        state.speed,
-        state.half_length,
-        state.half_width,
-    )
-    memory = CollisionMemory(
-        state.last_collision_actor,
-        state.last_collision_tick,
-        state.collision_places,
-        state.finished,
-    )
-    tick = state.tick[()]
     before = n
-    for ego in range(memory.finished.size):
-        forget_collisions(memory, ego, tick, bodies.x[ego], bodies.y[ego])
+    for ego in range(state.throttle.size):
+        forget_collisions(state, ego)
     for _ in range(PASSES):
-        touched, n = _resolve_once(
-            bodies, memory, state.walk_waiting, state.still_ticks, tick, out, n
-        )
+        touched, n = _resolve_once(state, out, n)
         if not touched:
             break
     count_rows(state.counts, out, before, n)
@@ -133,28 +114,28 @@ def resolve_contacts(state, out, n):
 
 
 @kernel
-def _resolve_once(bodies, memory, walk_waiting, lying_ticks, tick, out, n):
+def _resolve_once(state, out, n):
     """Resolves each overlap of an ego once; returns (whether there was one, rows in use)."""
     touched = False
-    egos = memory.finished.size
+    egos = state.throttle.size
     for ego in range(egos):
-        for other in range(ego + 1, bodies.kind.size):
-            if not may_touch(bodies, ego, other):
+        for other in range(ego + 1, state.kind.size):
+            if not may_touch(state, ego, other):
                 continue
-            if bodies.kind[other] == ABSENT or bodies.kind[ego] == ABSENT:
+            if state.kind[other] == ABSENT or state.kind[ego] == ABSENT:
                 continue
-            depth, nx, ny = overlap(box_of(bodies, ego), box_of(bodies, other))
+            depth, nx, ny = overlap(box_of(state, ego), box_of(state, other))
             if depth <= 0.0:
                 continue
             touched = True
             share = 0.5 if other < egos else 1.0
-            if bodies.kind[other] == WALKER:
-                _knock_down(bodies, walk_waiting, lying_ticks, ego, other)
+            if state.kind[other] == WALKER:
+                _knock_down(state, ego, other)
                 share = 0.0
             else:
-                _exchange_speed(bodies, ego, other, nx, ny)
-            _part(bodies, ego, other, share, (depth + SLOP_M) * nx, (depth + SLOP_M) * ny)
-            n = count_collision(memory, bodies, ego, other, tick, out, n)
+                _exchange_speed(state, ego, other, nx, ny)
+            _part(state, ego, other, share, (depth + SLOP_M) * nx, (depth + SLOP_M) * ny)
+            n = count_collision(state, ego, other, out, n)
             if other < egos:
-                n = count_collision(memory, bodies, other, ego, tick, out, n)
+                n = count_collision(state, other, ego, out, n)
     return touched, n

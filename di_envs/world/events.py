@@ -16,11 +16,11 @@ from di_envs.kernels import kernel
 from di_envs.town.queries import pose_at
 from di_envs.world.bodies import EgoNow
 from di_envs.world.event_rows import count_rows, record
-from di_envs.world.lane_keeping import LaneMemory, watch_lanes
+from di_envs.world.lane_keeping import watch_lanes
 from di_envs.world.red_light import detect_red_light
-from di_envs.world.route_end import EndMemory, find_route_end
+from di_envs.world.route_end import find_route_end
 from di_envs.world.state import EventKind
-from di_envs.world.stop_sign import StopMemory, detect_stop_sign
+from di_envs.world.stop_sign import detect_stop_sign
 
 OUTSIDE_LANES = int(EventKind.OUTSIDE_LANES)
 
@@ -80,29 +80,14 @@ def detect_events(state, lanes, signals, routes, ego, out, n):
         np.int64(state.lane[ego]),
         state.lane_m[ego],
     )
-    lane_memory = LaneMemory(
-        state.outside_lane,
-        state.wrong_lane,
-        state.lane_before,
-        state.lane_before_yaw,
-        state.outside_m,
-        state.outside_done_m,
-        state.outside_index,
-    )
-    stop_memory = StopMemory(state.stop_target, state.stop_done, state.stop_affected)
-    end_memory = EndMemory(
-        state.route_done_m, state.deviation_index, state.deviation_m, state.blocked_ticks
-    )
     before = n
     lane_yaw = pose_at(lanes, now.lane, now.lane_m)[3] if now.lane >= 0 else 0.0
-    watch_lanes(lanes, routes, now, lane_yaw, lane_memory)
-    n, state.last_red_signal[ego] = detect_red_light(
-        lanes, signals, state.light, now, state.last_red_signal[ego], out, n
-    )
-    n = detect_stop_sign(lanes, signals, now, lane_yaw, stop_memory, out, n)
-    reason = find_route_end(routes, now, end_memory)
+    watch_lanes(state, lanes, routes, now, lane_yaw)
+    n = detect_red_light(state, lanes, signals, now, out, n)
+    n = detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n)
+    reason = find_route_end(state, routes, now)
     if reason != 0:
-        n = _end_route(now, reason, lane_memory.outside_m[ego], out, n)
+        n = _end_route(now, reason, state.outside_m[ego], out, n)
         state.finished[ego] = reason
     count_rows(state.counts, out, before, n)
     return n

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LaneKind
@@ -20,18 +18,6 @@ LANE_JUMP = math.cos(math.radians(150.0))  # between two ticks' lanes: into or o
 WINDOW = 3  # route points looked at beyond the present one
 PARKING_LOOK_M = 10.0  # for a parking lane; further away none can help
 PARKING_MASK = 1 << int(LaneKind.PARKING)
-
-
-class LaneMemory(NamedTuple):
-    """What a state remembers of each ego's lanes; all (E,), see `State`."""
-
-    outside_lane: NDArray[np.int8]
-    wrong_lane: NDArray[np.int8]
-    lane_before: NDArray[np.int32]
-    lane_before_yaw: NDArray[np.float64]
-    outside_m: NDArray[np.float64]
-    outside_done_m: NDArray[np.float64]
-    outside_index: NDArray[np.int32]
 
 
 @kernel
@@ -69,32 +55,32 @@ def _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong):
 
 
 @kernel
-def watch_lanes(lanes, routes, ego, lane_yaw, memory):
+def watch_lanes(state, lanes, routes, ego, lane_yaw):
     """Updates the ego's lane flags, and counts the route metres passed while one is up.
 
     Args:
+        state: The world; the ego's lane flags and metres change.
         lanes: The town's lanes.
         routes: The egos' routes.
         ego: The ego now (`EgoNow`).
         lane_yaw: Direction of its lane there [rad].
-        memory: `LaneMemory`, changed in place.
     """
     e = ego.index
-    wrong = memory.wrong_lane[e] != 0
+    wrong = state.wrong_lane[e] != 0
     if ego.lane >= 0:
-        before, before_yaw = memory.lane_before[e], memory.lane_before_yaw[e]
+        before, before_yaw = state.lane_before[e], state.lane_before_yaw[e]
         wrong = _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong)
-        memory.lane_before[e], memory.lane_before_yaw[e] = ego.lane, lane_yaw
+        state.lane_before[e], state.lane_before_yaw[e] = ego.lane, lane_yaw
     outside = is_outside_lanes(lanes, ego)
-    memory.wrong_lane[e] = 1 if wrong else 0
-    memory.outside_lane[e] = 1 if outside else 0
+    state.wrong_lane[e] = 1 if wrong else 0
+    state.outside_lane[e] = 1 if outside else 0
 
     first, end = routes.start[e], routes.start[e + 1]
-    now = first + memory.outside_index[e]
+    now = first + state.outside_index[e]
     for point in range(now + 1, min(now + WINDOW + 1, end)):
         if is_past(routes.points, point, ego.x, ego.y):
-            done = routes.route_m[point] - routes.route_m[first + memory.outside_index[e]]
-            memory.outside_index[e] = point - first
-            memory.outside_done_m[e] += done
+            done = routes.route_m[point] - routes.route_m[first + state.outside_index[e]]
+            state.outside_index[e] = point - first
+            state.outside_done_m[e] += done
             if wrong or outside:
-                memory.outside_m[e] += done
+                state.outside_m[e] += done

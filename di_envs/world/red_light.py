@@ -79,23 +79,24 @@ def _tail_is_on(lanes, ego, stop):
 
 
 @kernel
-def detect_red_light(lanes, signals, light, ego, last_signal, out, n):
+def detect_red_light(state, lanes, signals, ego, out, n):
     """Records the red lights that the ego's tail is crossing.
 
     Args:
+        state: The world; `last_red_signal` changes.
         lanes: The town's lanes.
         signals: The town's signals.
-        light: (S,) what they show.
         ego: The ego now (`EgoNow`).
-        last_signal: The light that fined it last, which is not looked at; -1 for none.
         out: (N, 8) event rows.
         n: Rows in use.
 
     Returns:
-        (rows in use, the light that fined last).
+        The number of rows in use.
     """
     for signal in range(signals.kind.size):
-        if light[signal] != RED or signals.kind[signal] != LIGHT or signal == last_signal:
+        if state.light[signal] != RED or signals.kind[signal] != LIGHT:
+            continue
+        if signal == state.last_red_signal[ego.index]:
             continue
         if not _is_near(signals, signal, ego):
             continue
@@ -109,6 +110,6 @@ def detect_red_light(lanes, signals, light, ego, last_signal, out, n):
                 n = record(
                     out, n, RED_LIGHT, ego.index, ego.tick, pole[0], pole[1], pole[2], signal, 0.0
                 )
-                last_signal = signal
+                state.last_red_signal[ego.index] = signal
                 break
-    return n, last_signal
+    return n

@@ -4,10 +4,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.world.progress import route_completed
@@ -24,15 +20,6 @@ COMPLETED, DEVIATED = int(EventKind.COMPLETED), int(EventKind.ROUTE_DEVIATION)
 BLOCKED, TIMEOUT = int(EventKind.BLOCKED), int(EventKind.TIMEOUT)
 
 
-class EndMemory(NamedTuple):
-    """What a state remembers for the ends of routes; all (E,), see `State`."""
-
-    route_done_m: NDArray[np.float64]
-    deviation_index: NDArray[np.int32]
-    deviation_m: NDArray[np.float64]
-    blocked_ticks: NDArray[np.int32]
-
-
 @kernel
 def _nearest_ahead(points, begin, end, x, y):
     """The nearest of the route points [begin, end), the later of equals, and its distance [m]."""
@@ -46,44 +33,44 @@ def _nearest_ahead(points, begin, end, x, y):
 
 
 @kernel
-def has_deviated(routes, ego, memory):
+def has_deviated(state, routes, ego):
     """Follows the nearest route point; true over 30 m away, or after too long over 15 m away."""
     first, end = routes.start[ego.index], routes.start[ego.index + 1]
-    now = first + memory.deviation_index[ego.index]
+    now = first + state.deviation_index[ego.index]
     nearest, distance = _nearest_ahead(routes.points, now, min(now + WINDOW + 1, end), ego.x, ego.y)
     if distance >= SAFE_M:
-        memory.deviation_m[ego.index] += routes.route_m[nearest] - routes.route_m[now]
-    memory.deviation_index[ego.index] = nearest - first
+        state.deviation_m[ego.index] += routes.route_m[nearest] - routes.route_m[now]
+    state.deviation_index[ego.index] = nearest - first
     allowed_m = DEVIATION_SHARE * routes.route_m[end - 1]
-    return distance >= DEVIATION_M or memory.deviation_m[ego.index] > allowed_m
+    return distance >= DEVIATION_M or state.deviation_m[ego.index] > allowed_m
 
 
 @kernel
-def is_blocked(ego, memory):
+def is_blocked(state, ego):
     """Counts the ticks that the ego has stood; true after more than 180 s."""
     standing = ego.speed < BLOCKED_BELOW_MPS
-    ticks = memory.blocked_ticks[ego.index] + 1 if standing else 0
-    memory.blocked_ticks[ego.index] = ticks
+    ticks = state.blocked_ticks[ego.index] + 1 if standing else 0
+    state.blocked_ticks[ego.index] = ticks
     return ticks > BLOCKED_TICKS
 
 
 @kernel
-def find_route_end(routes, ego, memory):
+def find_route_end(state, routes, ego):
     """The EventKind that ends the route in this tick, 0 while it goes on.
 
     Of several at once, completion comes first, then deviation, blocked, timeout. A completed route
     is done in full.
 
     Args:
+        state: The world; what it remembers for the ends of routes changes.
         routes: The egos' routes.
         ego: The ego now (`EgoNow`).
-        memory: `EndMemory`, changed in place.
     """
-    deviated = has_deviated(routes, ego, memory)
-    blocked = is_blocked(ego, memory)
-    done_m = memory.route_done_m[ego.index]
+    deviated = has_deviated(state, routes, ego)
+    blocked = is_blocked(state, ego)
+    done_m = state.route_done_m[ego.index]
     if route_completed(routes, ego.index, done_m, ego.x, ego.y, ego.z):
-        memory.route_done_m[ego.index] = routes.route_m[routes.start[ego.index + 1] - 1]
+        state.route_done_m[ego.index] = routes.route_m[routes.start[ego.index + 1] - 1]
         return COMPLETED
     if deviated:
         return DEVIATED

@@ -13,10 +13,8 @@ axes.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.kernels import kernel
 from di_envs.town.lanes import SignalKind
@@ -32,14 +30,6 @@ LANE_LOOK_M = 40.0  # at most, from an ego to its lane
 STOOD_BELOW_MPS = 0.1
 
 STOP, STOP_SIGN = int(SignalKind.STOP), int(EventKind.STOP_SIGN)
-
-
-class StopMemory(NamedTuple):
-    """What a state remembers of the stop sign that each ego comes to; all (E,)."""
-
-    target: NDArray[np.int32]  # the sign watched, -1 for none
-    done: NDArray[np.int8]  # the ego stood
-    affected: NDArray[np.int8]  # the ego was in the box around the sign
 
 
 @kernel
@@ -107,36 +97,36 @@ def _find_sign(lanes, signals, ego, lane_yaw):
 
 
 @kernel
-def detect_stop_sign(lanes, signals, ego, lane_yaw, memory, out, n):
+def detect_stop_sign(state, lanes, signals, ego, lane_yaw, out, n):
     """Follows the stop sign ahead and records it when it was run.
 
     Args:
+        state: The world; `stop_target`, `stop_done` and `stop_affected` change.
         lanes: The town's lanes.
         signals: The town's signals.
         ego: The ego now (`EgoNow`).
         lane_yaw: Direction of its lane there [rad].
-        memory: `StopMemory`, changed in place.
         out: (N, 8) event rows.
         n: Rows in use.
 
     Returns:
         The number of rows in use.
     """
-    sign = np.int64(memory.target[ego.index])
+    sign = np.int64(state.stop_target[ego.index])
     if sign < 0:
-        memory.target[ego.index] = _find_sign(lanes, signals, ego, lane_yaw)
+        state.stop_target[ego.index] = _find_sign(lanes, signals, ego, lane_yaw)
         return n
     if ego.speed < STOOD_BELOW_MPS:
-        memory.done[ego.index] = 1
+        state.stop_done[ego.index] = 1
     pole = signals.pose[sign]
     extent_x, extent_y = _box_extent(signals, sign)
     if _inside(ego.x, ego.y, ego.z, pole, extent_x, extent_y):
-        memory.affected[ego.index] = 1
+        state.stop_affected[ego.index] = 1
     if is_ahead(lanes, signals, ego, sign):
         return n
-    if memory.done[ego.index] == 0 and memory.affected[ego.index] == 1:
+    if state.stop_done[ego.index] == 0 and state.stop_affected[ego.index] == 1:
         n = record(out, n, STOP_SIGN, ego.index, ego.tick, pole[0], pole[1], pole[2], sign, 0.0)
-    memory.target[ego.index] = -1
-    memory.done[ego.index] = 0
-    memory.affected[ego.index] = 0
+    state.stop_target[ego.index] = -1
+    state.stop_done[ego.index] = 0
+    state.stop_affected[ego.index] = 0
     return n

@@ -13,7 +13,7 @@ from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, uniform
 from di_envs.world.contact import DOWN
-from di_envs.world.crossing import BODY_M, is_in_the_way, is_vehicle, may_cross
+from di_envs.world.crossing import BODY_M, is_blocked, may_cross
 from di_envs.world.state import TICK_S, ActorKind
 
 SLOWEST_MPS, FASTEST_MPS = 0.8, 1.8
@@ -25,23 +25,24 @@ MARGIN_M = 0.3  # kept from vehicles
 SQUEEZE_TICKS = round(10.0 / TICK_S)  # of standing still after which that margin is given up
 GIVE_UP_TICKS = round(40.0 / TICK_S)  # of waiting at a kerb after which one turns back
 LIE_TICKS = round(10.0 / TICK_S)
+HEIGHT_M = 1.7
 SPAWN_TRIES = 8
 SPAWN_ROOM_M = 1.5
+
 SPAWN_STREAM, PACE_STREAM = int(Stream.WALKER_SPAWN), int(Stream.WALKER_PACE)
 TURN_STREAM = int(Stream.WALKER_TURN)
 ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
-HEIGHT_M = 1.7
 
 
 @kernel
 def _sidewalk_at(walk, share):
     """The edge and station at a share of all sidewalks' length; crosswalks are left out."""
     total = 0.0
-    for edge in range(walk.first.shape[0]):
+    for edge in range(walk.first.size):
         if walk.crosswalk[edge] < 0:
             total += walk.length_m[edge]
     rest, last = share * total, -1
-    for edge in range(walk.first.shape[0]):
+    for edge in range(walk.first.size):
         if walk.crosswalk[edge] < 0:
             last = edge
             if rest < walk.length_m[edge]:
@@ -60,16 +61,14 @@ def _is_free(state, first, walker, edge, station):
 
 
 @kernel
-def _place_target(state, walk, walker):
-    """Where the walker's edge, station and direction put them: x, y, z and yaw."""
-    edge, direction = state.walk_edge[walker], state.walk_direction[walker]
-    spacing = walk.spacing_m[edge]
-    step = state.walk_m[walker] / spacing
+def place_on_edge(walk, edge, station, direction):
+    """Where somebody walks who goes in `direction` at a station: (x, y, z, yaw)."""
+    step = station / walk.spacing_m[edge]
     k = min(max(int(step), 0), walk.size[edge] - 2)
-    a, b, part = walk.points[walk.first[edge] + k], walk.points[walk.first[edge] + k + 1], step - k
+    part = step - k
+    a, b = walk.points[walk.first[edge] + k], walk.points[walk.first[edge] + k + 1]
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    length = max(math.hypot(dx, dy), 1e-9)
-    side = direction * walk.side_m[edge] / length
+    side = direction * walk.side_m[edge] / max(math.hypot(dx, dy), 1e-9)
     yaw = a[3] if direction > 0 else wrap_angle(a[3] + math.pi)
     return a[0] + part * dx - side * dy, a[1] + part * dy + side * dx, a[2] + part * dz, yaw
 
@@ -84,8 +83,7 @@ def spawn_walkers(state, walk, first, count):
     for walker in range(first, first + count):
         state.kind[walker] = ABSENT
         for attempt in range(SPAWN_TRIES):
-            draw = uniform(seed, SPAWN_STREAM, attempt, walker)
-            edge, station = _sidewalk_at(walk, draw)
+            edge, station = _sidewalk_at(walk, uniform(seed, SPAWN_STREAM, attempt, walker))
             if edge >= 0 and _is_free(state, first, walker, edge, station):
                 _stand_up(state, walk, walker, edge, station)
                 break
@@ -98,18 +96,19 @@ def _stand_up(state, walk, walker, edge, station):
     state.half_length[walker] = BODY_M
     state.half_width[walker] = BODY_M
     state.height[walker] = HEIGHT_M
+    state.lane[walker] = -1
     state.walk_edge[walker] = edge
     state.walk_m[walker] = station
     forth = uniform(seed, SPAWN_STREAM, SPAWN_TRIES, walker) < 0.5
     state.walk_direction[walker] = 1 if forth else -1
     state.walk_waiting[walker] = 0
     state.still_ticks[walker] = 0
-    state.lane[walker] = -1
-    pace = uniform(seed, PACE_STREAM, 0, walker)
-    state.desired_factor[walker] = SLOWEST_MPS + pace * (FASTEST_MPS - SLOWEST_MPS)
-    x, y, z, yaw = _place_target(state, walk, walker)
-    state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = x, y, z, yaw
     state.speed[walker] = 0.0
+    share = uniform(seed, PACE_STREAM, 0, walker)
+    state.desired_factor[walker] = SLOWEST_MPS + share * (FASTEST_MPS - SLOWEST_MPS)
+    x, y, z, yaw = place_on_edge(walk, edge, station, state.walk_direction[walker])
+    state.x[walker], state.y[walker], state.z[walker] = x, y, z
+    state.yaw[walker] = yaw
 
 
 @kernel
@@ -120,53 +119,42 @@ def _travelled(walk, edge, direction, station):
 
 @kernel
 def _road_part(walk, edge, direction):
-    """Where the edge's driving part begins and ends, in the direction of walking."""
-    if direction > 0:
-        return walk.road_begin_m[edge], walk.road_end_m[edge]
-    return walk.length_m[edge] - walk.road_end_m[edge], walk.length_m[edge] - walk.road_begin_m[
-        edge
-    ]
+    """Kerb and edges of the driving part in the direction of walking: (kerb, begin, end) [m]."""
+    begin, end = walk.road_begin_m[edge], walk.road_end_m[edge]
+    if direction < 0:
+        begin, end = walk.length_m[edge] - end, walk.length_m[edge] - begin
+    return max(begin - KERB_M - BODY_M, 0.0), begin, end
 
 
 @kernel
-def _behind_others(state, walk, walker, first, end, pace):
+def _behind_others(state, walker, first, end, pace):
     """The pace, slowed to that of somebody close ahead on the same edge, going the same way."""
-    edge, direction = state.walk_edge[walker], state.walk_direction[walker]
+    edge, direction, at = (
+        state.walk_edge[walker],
+        state.walk_direction[walker],
+        state.walk_m[walker],
+    )
     for other in range(first, end):
         if state.walk_edge[other] != edge or other == walker or state.kind[other] != WALKER:
             continue
         if state.walk_direction[other] != direction:
             continue
-        gap = (state.walk_m[other] - state.walk_m[walker]) * direction
+        gap = (state.walk_m[other] - at) * direction
         if 0.0 < gap < FOLLOW_M or (gap == 0.0 and other > walker):
             pace = 0.0 if gap < BESIDE_M else min(pace, state.speed[other])
     return pace
 
 
 @kernel
-def _is_blocked(state, walker, step_x, step_y, actors):
-    """Whether a vehicle among the first `actors` stands in, or drives into, the next step."""
-    margin = MARGIN_M if state.still_ticks[walker] < SQUEEZE_TICKS else 0.0
-    x, y, z = state.x[walker], state.y[walker], state.z[walker]
-    for actor in range(actors):
-        if is_vehicle(state, actor) and is_in_the_way(
-            state, actor, x, y, z, step_x, step_y, margin
-        ):
-            return True
-    return False
-
-
-@kernel
-def _must_wait(state, walk, signals, walker, pace):
+def _must_wait(state, walk, signals, walker, first, pace):
     """Whether the walker has come to the kerb and may not cross yet."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
-    begin, end = _road_part(walk, edge, direction)
-    kerb = max(begin - KERB_M - BODY_M, 0.0)
+    kerb, _begin, end = _road_part(walk, edge, direction)
     at = _travelled(walk, edge, direction, state.walk_m[walker])
     if at > kerb or at + pace * TICK_S < kerb:
         return False
     needed_ticks = int((end - kerb) / pace / TICK_S) + 1
-    return not may_cross(state, walk, signals, walk.crosswalk[edge], needed_ticks)
+    return not may_cross(state, walk, signals, walk.crosswalk[edge], needed_ticks, first)
 
 
 @kernel
@@ -189,15 +177,18 @@ def _go_on(state, walk, walker):
         return
     draw = uniform(state.seed[()], TURN_STREAM, state.tick[()], walker)
     link = begin + int(draw * choices)
-    edge, direction = walk.next_edge[link], walk.next_direction[link]
-    state.walk_edge[walker], state.walk_direction[walker] = edge, direction
-    state.walk_m[walker] = 0.0 if direction > 0 else walk.length_m[edge]
+    state.walk_edge[walker] = walk.next_edge[link]
+    state.walk_direction[walker] = walk.next_direction[link]
+    from_start = walk.next_direction[link] > 0
+    state.walk_m[walker] = 0.0 if from_start else walk.length_m[walk.next_edge[link]]
 
 
 @kernel
 def _step_towards(state, walk, walker, reach_m):
     """Moves the body towards its place, at most `reach_m`: corners are cut, not leapt."""
-    x, y, z, yaw = _place_target(state, walk, walker)
+    x, y, z, yaw = place_on_edge(
+        walk, state.walk_edge[walker], state.walk_m[walker], state.walk_direction[walker]
+    )
     dx, dy = x - state.x[walker], y - state.y[walker]
     distance = math.hypot(dx, dy)
     share = 1.0 if distance <= reach_m else reach_m / distance
@@ -229,23 +220,36 @@ def _stand(state, walker, waiting):
 
 
 @kernel
+def _is_held(state, walker, pace, bodies):
+    """Whether a vehicle among the first `bodies` actors is in the way of the next step."""
+    margin = MARGIN_M if state.still_ticks[walker] < SQUEEZE_TICKS else 0.0
+    step = pace * TICK_S + 0.1
+    return is_blocked(
+        state,
+        bodies,
+        state.x[walker],
+        state.y[walker],
+        state.z[walker],
+        step * math.cos(state.yaw[walker]),
+        step * math.sin(state.yaw[walker]),
+        margin,
+    )
+
+
+@kernel
 def _walk_on(state, walk, signals, walker, first, end):
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     crossing = walk.crosswalk[edge] >= 0
     pace = state.desired_factor[walker]
     if crossing:
         pace = max(pace, CROSSING_MPS)
-        if _must_wait(state, walk, signals, walker, pace):
+        if _must_wait(state, walk, signals, walker, first, pace):
             _stand(state, walker, 1)
             return
-    pace = _behind_others(state, walk, walker, first, end, pace)
-    heading = state.yaw[walker]
-    step = pace * TICK_S + 0.1
+    pace = _behind_others(state, walker, first, end, pace)
     # on sidewalks only egos can be in the way
-    bodies = first if crossing else state.throttle.shape[0]
-    if pace <= 0.0 or _is_blocked(
-        state, walker, step * math.cos(heading), step * math.sin(heading), bodies
-    ):
+    bodies = first if crossing else state.throttle.size
+    if pace <= 0.0 or _is_held(state, walker, pace, bodies):
         _stand(state, walker, 0)
         return
     state.walk_waiting[walker] = 0
@@ -262,7 +266,7 @@ def move_walkers(state, walk, signals, first):
 
     Actors before `first` are the egos and vehicles that walkers look out for.
     """
-    end = state.kind.shape[0]
+    end = state.kind.size
     for walker in range(first, end):
         if state.kind[walker] != WALKER:
             continue
@@ -279,11 +283,11 @@ def mark_busy_crosswalks(state, walk, busy):
     From the step off the kerb to the far edge; walkers who wait do not count, who lie there do.
     """
     busy[:] = 0
-    for walker in range(state.kind.shape[0]):
-        if state.kind[walker] != WALKER or walk.crosswalk[state.walk_edge[walker]] < 0:
+    kind, walk_edge, walk_m = state.kind, state.walk_edge, state.walk_m
+    for walker in range(kind.size):
+        if kind[walker] != WALKER or walk.crosswalk[walk_edge[walker]] < 0:
             continue
-        edge, direction = state.walk_edge[walker], state.walk_direction[walker]
-        begin, end = _road_part(walk, edge, direction)
-        at = _travelled(walk, edge, direction, state.walk_m[walker])
-        if max(begin - KERB_M - BODY_M, 0.0) < at < end + BODY_M:
+        edge, direction = walk_edge[walker], state.walk_direction[walker]
+        kerb, _begin, end = _road_part(walk, edge, direction)
+        if kerb < _travelled(walk, edge, direction, walk_m[walker]) < end + BODY_M:
             busy[walk.crosswalk[edge]] = 1
