@@ -20,7 +20,7 @@ HEAVY = ("torch", "highway_env", "pandas", "matplotlib", "numba")
 
 
 def run_python(code: str, *first_on_path: Path) -> subprocess.CompletedProcess[str]:
-    """Runs code in a fresh interpreter that finds our checkout after the folders given, not by its cwd."""
+    """Runs code in a fresh interpreter that finds our checkout behind the folders given."""
     path = os.pathsep.join(str(folder) for folder in (*first_on_path, TOP))
     return subprocess.run(
         [sys.executable, "-P", "-c", code],
