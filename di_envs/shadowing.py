@@ -29,7 +29,7 @@ def check_not_shadowed(top: Path, names: tuple[str, ...] = SHADOWED_NAMES) -> No
         if not ours.is_dir():
             continue  # a partial installation: nothing of ours to hide
         found = _folders(name)
-        if found and ours.resolve() not in found:
+        if found and ours.resolve() != found[0]:
             raise ImportError(
                 f"`{name}` is DriveInsight's package at {ours}, but another one comes first: "
                 f"{found[0]}. Put {top} before {found[0].parent} on sys.path (for PYTHONPATH: name "
