@@ -12,6 +12,7 @@ import hashlib
 from functools import cached_property
 from typing import Any, TypeVar
 
+import di_envs.kernels  # noqa: F401  # isort: skip (says how Numba loads, so it comes first)
 import numba
 import numpy as np
 from llvmlite import ir

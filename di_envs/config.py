@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
-from di_envs.world.state import TICK_S, EventKind
+from di_envs.world.kinds import TICK_S, EventKind
 
 OBSERVATION_GROUPS = ("prompt", "inertial")  # what can be asked for now
 LATER_GROUPS = ("camera", "lidar")  # named in the design, not rendered yet

@@ -24,10 +24,9 @@ from di_envs.prompt import (
     empty_prompt,
     fill_prompt,
     prompt_route_of,
-    scene_of,
     stop_lines_of,
 )
-from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu, inertial_state_of
+from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
@@ -109,8 +108,7 @@ class Observer:
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""
-        self._scene = scene_of(view.state)
-        self._inertial = inertial_state_of(view.state)
+        self._state = view.state
         self._route = prompt_route_of(view.plans[self._ego])
 
     def observe(self) -> dict[str, Any]:
@@ -118,14 +116,14 @@ class Observer:
         observation: dict[str, Any] = {}
         if "prompt" in self._groups:
             out = self._prompt
-            fill_prompt(self._scene, self._route, self._stop_lines, self._chunks, self._ego, out)
+            fill_prompt(self._state, self._route, self._stop_lines, self._chunks, self._ego, out)
             observation["command"] = out.command[0]
             for name in COMPONENTS[1:]:
                 observation[name] = getattr(out, name).copy()
             observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
         if "inertial" in self._groups:
-            fill_imu(self._inertial, self._ego, self._imu)
-            fill_gnss(self._inertial, self._ego, *self._geo_origin, self._gnss)
+            fill_imu(self._state, self._ego, self._imu)
+            fill_gnss(self._state, self._ego, *self._geo_origin, self._gnss)
             observation["imu"] = self._imu.copy()
             observation["gnss"] = self._gnss.copy()
         return observation

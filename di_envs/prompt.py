@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.bundles import by_reference
 from di_envs.geometry import to_local, wrap_angle
 from di_envs.kernels import kernel
 from di_envs.map_chunks import CELL_M, POINTS, RANGE_M, MapChunks
 from di_envs.town.lanes import SignalKind, Signals
 from di_envs.town.plan import RoutePlan
-from di_envs.world.state import HISTORY_LENGTH, HISTORY_TICKS, SPEED_HISTORY, State
+from di_envs.world.state import HISTORY_LENGTH, HISTORY_TICKS, SPEED_HISTORY
 
 COMPONENTS = (
     "command",
@@ -49,24 +50,7 @@ _ABSENT, _NO_OPTION, _LAST_OPTION = 0, 0, 6
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 
 
-class Scene(NamedTuple):
-    """The parts of the world's state that the prompt reads: views that share its memory."""
-
-    tick: NDArray[np.int64]
-    kind: NDArray[np.int8]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    z: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    half_length: NDArray[np.float64]
-    half_width: NDArray[np.float64]
-    light: NDArray[np.int8]
-    speed_history: NDArray[np.float64]
-    route_index: NDArray[np.int32]
-    target_index: NDArray[np.int32]
-
-
+@by_reference
 class StopLines(NamedTuple):
     """The town's stop lines (K): all that the prompt tells of signals."""
 
@@ -75,6 +59,7 @@ class StopLines(NamedTuple):
     kind: NDArray[np.int8]  # (K,) SignalKind
 
 
+@by_reference
 class PromptRoute(NamedTuple):
     """One ego's route, as the prompt reads it."""
 
@@ -83,6 +68,7 @@ class PromptRoute(NamedTuple):
     target: NDArray[np.int32]  # (T,) indices of the target points
 
 
+@by_reference
 class Prompt(NamedTuple):
     """What the kernel fills: one array a component. See `observation_space` for the columns."""
 
@@ -97,20 +83,15 @@ class Prompt(NamedTuple):
     speed_history: NDArray[np.float32]  # (SPEED_HISTORY,)
 
 
-def scene_of(state: State) -> Scene:
-    """The prompt's views into a world's state."""
-    return Scene(*(getattr(state, name) for name in Scene._fields))
-
-
 def stop_lines_of(signals: Signals) -> StopLines:
-    """A town's stop lines. Copied, as read-only arrays would compile the kernels anew."""
+    """A town's stop lines."""
     kind = signals.kind[signals.stop_signal].astype(np.int8)
-    return StopLines(signals.stop_pose.copy(), signals.stop_signal.copy(), kind)
+    return StopLines(signals.stop_pose, signals.stop_signal, kind)
 
 
 def prompt_route_of(plan: RoutePlan) -> PromptRoute:
-    """The parts of a plan that the prompt reads. Copied, for the same reason."""
-    return PromptRoute(plan.points.copy(), plan.option.copy(), plan.targets.copy())
+    """The parts of a plan that the prompt reads."""
+    return PromptRoute(plan.points, plan.option, plan.targets)
 
 
 def empty_prompt() -> Prompt:
@@ -129,27 +110,27 @@ def empty_prompt() -> Prompt:
 
 
 @kernel
-def fill_prompt(scene, route, stop_lines, chunks, ego, out):
+def fill_prompt(state, route, stop_lines, chunks, ego, out):
     """Writes an ego's prompt.
 
     Args:
-        scene: `Scene` of the present state.
+        state: `State` of the world.
         route: `PromptRoute` of the ego.
         stop_lines: `StopLines` of the town.
         chunks: `MapChunks` of the town.
         ego: The ego's index.
         out: `Prompt` to write; every entry of it is written.
     """
-    pose = (scene.x[ego], scene.y[ego], scene.yaw[ego])
-    z = scene.z[ego]
-    fill_target(route, scene.target_index[ego], pose, out.command, out.target_point)
-    fill_routing(route.points, scene.route_index[ego], pose, out.routing)
+    pose = (state.x[ego], state.y[ego], state.yaw[ego])
+    z = state.z[ego]
+    fill_target(route, state.target_index[ego], pose, out.command, out.target_point)
+    fill_routing(route.points, state.route_index[ego], pose, out.routing)
     fill_map(chunks, pose, z, out.map)
-    fill_obstacles(scene, ego, pose, z, out.obstacles)
-    fill_traffic_lights(stop_lines, scene.light, pose, z, out.traffic_lights)
+    fill_obstacles(state, ego, pose, z, out.obstacles)
+    fill_traffic_lights(stop_lines, state.light, pose, z, out.traffic_lights)
     fill_stop_signs(stop_lines, pose, z, out.stop_signs)
-    out.speed[0] = clipped(scene.speed[ego], SPEED_LIMIT_MPS)
-    fill_speed_history(scene.speed_history[ego], scene.tick[()], out.speed_history)
+    out.speed[0] = clipped(state.speed[ego], SPEED_LIMIT_MPS)
+    fill_speed_history(state.speed_history[ego], state.tick[()], out.speed_history)
 
 
 @kernel
@@ -272,37 +253,37 @@ def fill_polyline(points, kind, pose, z, out):
 
 
 @kernel
-def fill_obstacles(scene, ego, pose, z, out):
+def fill_obstacles(state, ego, pose, z, out):
     """The nearest other actors: x, y, yaw, length, width, vx, vy, kind, valid."""
     distance = np.empty(OBSTACLES)
     chosen = np.empty(OBSTACLES, np.int64)
     count = 0
-    for actor in range(scene.kind.size):
-        if actor == ego or scene.kind[actor] == _ABSENT or abs(scene.z[actor] - z) > LEVEL_M:
+    for actor in range(state.kind.size):
+        if actor == ego or state.kind[actor] == _ABSENT or abs(state.z[actor] - z) > LEVEL_M:
             continue
-        dx, dy = scene.x[actor] - pose[0], scene.y[actor] - pose[1]
+        dx, dy = state.x[actor] - pose[0], state.y[actor] - pose[1]
         squared = dx * dx + dy * dy
         if squared <= OBSTACLE_RANGE_M * OBSTACLE_RANGE_M:
             count = insert_nearest(distance, chosen, count, squared, actor)
     for slot in range(OBSTACLES):
         if slot < count:
-            fill_obstacle(scene, chosen[slot], pose, out[slot])
+            fill_obstacle(state, chosen[slot], pose, out[slot])
         else:
             out[slot, :] = 0.0
 
 
 @kernel
-def fill_obstacle(scene, actor, pose, out):
+def fill_obstacle(state, actor, pose, out):
     """One actor; its velocity is over the ground, turned into the ego's axes."""
-    yaw = wrap_angle(scene.yaw[actor] - pose[2])
-    speed = clipped(scene.speed[actor], SPEED_LIMIT_MPS)
-    place(pose, scene.x[actor], scene.y[actor], out)
+    yaw = wrap_angle(state.yaw[actor] - pose[2])
+    speed = clipped(state.speed[actor], SPEED_LIMIT_MPS)
+    place(pose, state.x[actor], state.y[actor], out)
     out[2] = yaw
-    out[3] = 2.0 * scene.half_length[actor]
-    out[4] = 2.0 * scene.half_width[actor]
+    out[3] = 2.0 * state.half_length[actor]
+    out[4] = 2.0 * state.half_width[actor]
     out[5] = speed * math.cos(yaw)
     out[6] = speed * math.sin(yaw)
-    out[7] = scene.kind[actor]
+    out[7] = state.kind[actor]
     out[8] = 1.0
 
 
@@ -359,4 +340,4 @@ def fill_speed_history(ring, tick, out):
         out[past] = clipped(ring[then % HISTORY_LENGTH], SPEED_LIMIT_MPS) if then >= 0 else 0.0
 
 
-__all__ = ["COMPONENTS", "MapChunks", "Prompt", "PromptRoute", "Scene", "StopLines", "fill_prompt"]
+__all__ = ["COMPONENTS", "MapChunks", "Prompt", "PromptRoute", "StopLines", "fill_prompt"]

@@ -11,21 +11,19 @@ from hypothesis.strategies import floats
 
 from di_envs.sensors.inertial import (
     EARTH_RADIUS_M,
-    InertialState,
     fill_gnss,
     fill_imu,
     geodetic,
 )
+from di_envs.world.state import Capacity, state_dtype, views_of
 
 
 def state_of(tick=0, seed=1, **values):
     """One ego at the origin, standing, facing east, but for the values given."""
-    names = ("x", "y", "z", "yaw", "speed", "acceleration", "yaw_rate")
-    rows = {name: np.array([values.get(name, 0.0)]) for name in names}
-    arrays = {"seed": np.array(seed, np.uint64), "tick": np.array(tick, np.int64), **rows}
-    for array in arrays.values():
-        array.flags.writeable = False  # as the world's view has them
-    return InertialState(**arrays)
+    state = views_of(np.zeros(1, state_dtype(Capacity(1, 0, 0, 0, 0, 0))))
+    for name, value in {"tick": tick, "seed": seed, **values}.items():
+        getattr(state, name)[...] = value
+    return state
 
 
 def imu(**values):

@@ -10,15 +10,10 @@ sensor that is added or read twice changes nothing.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, normal
-from di_envs.world.state import State
 
 GRAVITY_MPS2 = 9.81
 ACCELERATION_NOISE_MPS2 = (0.001, 0.001, 0.015)
@@ -31,25 +26,6 @@ _IMU, _GNSS = int(Stream.IMU), int(Stream.GNSS)
 _CHANNELS = 8  # keys kept apart for each ego; an IMU draws six
 
 
-class InertialState(NamedTuple):
-    """The parts of the world's state that these sensors read: views that share its memory."""
-
-    seed: NDArray[np.uint64]
-    tick: NDArray[np.int64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    z: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    yaw_rate: NDArray[np.float64]
-
-
-def inertial_state_of(state: State) -> InertialState:
-    """These sensors' views into a world's state."""
-    return InertialState(*(getattr(state, name) for name in InertialState._fields))
-
-
 @kernel
 def fill_imu(state, ego, out):
     """Writes accelerations [m/s2], angular rates [rad/s] and the compass [rad], CARLA's order.
@@ -57,7 +33,7 @@ def fill_imu(state, ego, out):
     The road is taken as level: the ego has no pitch or roll, and z shows gravity alone.
 
     Args:
-        state: `InertialState` of the present.
+        state: `State` of the world.
         ego: The ego's index.
         out: (7,) ax, ay, az, gx, gy, gz, compass in [0, 2 pi).
     """
@@ -91,7 +67,7 @@ def fill_gnss(state, ego, origin_latitude, origin_longitude, out):
     """Writes latitude [deg], longitude [deg] and altitude [m].
 
     Args:
-        state: `InertialState` of the present.
+        state: `State` of the world.
         ego: The ego's index.
         origin_latitude: Of the map's origin [deg].
         origin_longitude: Of the map's origin [deg].

@@ -7,50 +7,22 @@ World frame, SI units; stations are along the lane in its direction of travel.
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.bundles import by_reference
+from di_envs.world.kinds import TICK_S as TICK_S
+from di_envs.world.kinds import ActorKind as ActorKind
+from di_envs.world.kinds import EventKind as EventKind
 
-TICK_S = 0.05  # 20 Hz, as in the CARLA Leaderboard
 PATH_LANES = 6  # lanes ahead that a vehicle has chosen, its own first
 SPEED_HISTORY = 4  # past speeds in an observation, at 0.5 s, 1 s, …
 HISTORY_TICKS = 10  # ticks between two of them
 HISTORY_LENGTH = SPEED_HISTORY * HISTORY_TICKS + 1
 OCCUPIED_LANES = 4  # lanes that a free body (an ego, a walker) may lie on at once
 COLLISION_MEMORY = 8  # remembered collision places
-
-
-class ActorKind(IntEnum):
-    """What an actor is; ABSENT slots hold nobody."""
-
-    ABSENT = 0
-    CAR = 1
-    VAN = 2
-    TRUCK = 3
-    BUS = 4
-    MOTORCYCLE = 5
-    BICYCLE = 6
-    WALKER = 7
-    PROP = 8
-
-
-class EventKind(IntEnum):
-    """What Leaderboard 1.0 counts, and what ends a route."""
-
-    COLLISION_WALKER = 1
-    COLLISION_VEHICLE = 2
-    COLLISION_STATIC = 3
-    RED_LIGHT = 4
-    STOP_SIGN = 5
-    OUTSIDE_LANES = 6  # value: metres outside or against the lane
-    ROUTE_DEVIATION = 7
-    BLOCKED = 8
-    TIMEOUT = 9
-    COMPLETED = 10
 
 
 @by_reference
@@ -208,7 +180,7 @@ def views_of(record: NDArray[np.void]) -> State:
 
 @by_reference
 class Routes(NamedTuple):
-    """The egos' plans for kernels, one after the other: ego e has points [start[e], start[e + 1])."""
+    """The egos' plans for kernels, in a row: ego e has points [start[e], start[e + 1])."""
 
     start: NDArray[np.int32]  # (E + 1,)
     points: NDArray[np.float64]  # (R, 4) x, y, z, yaw
