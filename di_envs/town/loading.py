@@ -14,7 +14,7 @@ from di_envs.town.network import build_lanes, junction_names
 from di_envs.town.opendrive import read_opendrive
 from di_envs.town.opendrive_records import OpenDrive
 from di_envs.town.sampling import LaneGeometry
-from di_envs.town.sidecar import guessed_heads, heads_of_sidecar, read_sidecar
+from di_envs.town.sidecar import enforced_limits, guessed_heads, heads_of_sidecar, read_sidecar
 from di_envs.town.signals import Head, assemble_signals
 from di_envs.town.stretches import Stretch
 from di_envs.town.town import Town
@@ -73,6 +73,8 @@ def _parse(
     names = junction_names(document)
     heads = _heads(document, lanes, stretches, geometry, source, sidecar)
     signals, stop_line = assemble_signals(lanes, heads, len(names))
+    if sidecar is not None:
+        lanes = enforced_limits(lanes, read_sidecar(sidecar).speed_limits)
     return Town(
         name=path.stem,
         lanes=lanes._replace(stop_line=stop_line),
@@ -95,7 +97,7 @@ def _heads(
     sidecar: Path | None,
 ) -> list[Head]:
     if sidecar is not None:
-        rules = read_sidecar(sidecar)
+        rules = read_sidecar(sidecar).junctions
         return heads_of_sidecar(rules, lanes, junction_names(document), str(sidecar))
     if source == FROM_MAP:
         return heads_in_map(document, lanes, stretches, geometry)

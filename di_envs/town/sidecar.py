@@ -3,6 +3,7 @@
 A sidecar is a JSON file:
 
     {"town": "Town05", "source": "where this is known from",
+     "speed_limits": [{"map_kmh": 88.5, "kmh": 50}],
      "junctions": [
        {"junction": "53", "centre": [-127, -90], "kind": "lights"},
        {"junction": "224", "centre": [150, -1], "kind": "stop", "arms": "stem"},
@@ -13,6 +14,9 @@ maps. Without it the id does. `kind` is one of lights, stop, yield, none. `arms`
 default), "stem" (the arm of a T that the through road passes) or a list: each entry's `at` is a
 point near the arm's stop line, its `kind` (by default the junction's) what stands there; arms that
 are not listed have nothing. Junctions that are not listed have nothing either.
+
+`speed_limits` (optional) replaces limits that the map's editor left at its defaults: lanes whose
+limit in the map is `map_kmh` (within 1 km/h) get `kmh`.
 """
 
 from __future__ import annotations
@@ -37,12 +41,14 @@ KINDS = {
     "yield": SignalKind.YIELD,
     "none": None,
 }
+SPEED_MATCH_KMH = 1.0
 MATCH_M = 12.0  # between a junction's centre and the one that a sidecar names
 ARM_MATCH_M = 12.0  # between an arm's stop line and the point that a sidecar names
 MANY_ARMS = 4  # junctions of so many arms get lights or all-way stops when guessing
 LANES_FOR_LIGHTS = 1.75  # approach lanes an arm, on average, from which a guess takes lights
 
-_FILE_KEYS = ("town", "source", "junctions")
+_FILE_KEYS = ("town", "source", "speed_limits", "junctions")
+_SPEED_KEYS = ("map_kmh", "kmh")
 _JUNCTION_KEYS = ("junction", "centre", "kind", "arms")
 _ARM_KEYS = ("at", "kind")
 _ARM_WORDS = ("all", "stem")
@@ -66,7 +72,15 @@ class JunctionRule:
     arms: str | tuple[ArmRule, ...]
 
 
-def read_sidecar(path: Path) -> list[JunctionRule]:
+@dataclass(frozen=True, kw_only=True)
+class Sidecar:
+    """What a sidecar file says."""
+
+    junctions: tuple[JunctionRule, ...]
+    speed_limits: tuple[tuple[float, float], ...]  # limit in the map, limit instead [km/h]
+
+
+def read_sidecar(path: Path) -> Sidecar:
     """Reads a sidecar file.
 
     Raises:
@@ -81,11 +95,24 @@ def read_sidecar(path: Path) -> list[JunctionRule]:
     if not isinstance(content.get("junctions"), list):
         raise ValueError(f"{path}: 'junctions' must be a list of objects.")
     rows = enumerate(content["junctions"])
-    return [_junction_rule(row, f"{path}: junctions[{i}]") for i, row in rows]
+    speeds = enumerate(content.get("speed_limits", ()))
+    return Sidecar(
+        junctions=tuple(_junction_rule(row, f"{path}: junctions[{i}]") for i, row in rows),
+        speed_limits=tuple(_speed_rule(row, f"{path}: speed_limits[{i}]") for i, row in speeds),
+    )
+
+
+def enforced_limits(lanes: Lanes, rules: tuple[tuple[float, float], ...]) -> Lanes:
+    """The lanes with the limits that a sidecar puts in place of the map's."""
+    kmh = lanes.speed_limit_mps * 3.6
+    enforced = lanes.speed_limit_mps.copy()
+    for in_map, instead in rules:
+        enforced[np.abs(kmh - in_map) <= SPEED_MATCH_KMH] = instead / 3.6
+    return lanes._replace(speed_limit_mps=enforced)
 
 
 def heads_of_sidecar(
-    rules: list[JunctionRule], lanes: Lanes, junctions: tuple[str, ...], source: str
+    rules: tuple[JunctionRule, ...], lanes: Lanes, junctions: tuple[str, ...], source: str
 ) -> list[Head]:
     """The heads that a sidecar's rules put into a town.
 
@@ -152,6 +179,17 @@ def _junction_rule(row: Any, where: str) -> JunctionRule:
         kind=kind,
         arms=arms,
     )
+
+
+def _speed_rule(row: Any, where: str) -> tuple[float, float]:
+    _check_keys(row, _SPEED_KEYS, where)
+    try:
+        in_map, instead = float(row["map_kmh"]), float(row["kmh"])
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{where} needs the numbers map_kmh and kmh, got {row!r}.") from None
+    if not 0.0 < instead <= 300.0:
+        raise ValueError(f"{where}: kmh must lie in (0, 300], got {instead:g}.")
+    return in_map, instead
 
 
 def _check_keys(row: Any, known: tuple[str, ...], where: str) -> None:

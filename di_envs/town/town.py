@@ -1,4 +1,4 @@
-"""A town: its lane network, signals and crosswalks, read once and shared by everybody, read-only."""
+"""A town: its lane network, signals and crosswalks, read once, shared by all, read-only."""
 
 from __future__ import annotations
 

@@ -293,3 +293,17 @@ def test_the_shipped_sidecar_fits_the_real_town05(shared, tmp_path):
         (head,) = np.flatnonzero(signals.junction == town.junction_names.index(name))
         stops = signals.stop_pose[signals.stop_signal == head]
         assert np.hypot(stops[:, 0] - x, stops[:, 1] - y).max() < 4.0, name
+
+
+def test_a_sidecar_replaces_the_limits_that_the_maps_editor_left(shared, tmp_path):
+    path = shared / "data" / "xodr" / "Town05.xodr"
+    town = load_town(path, "town05", cache_folder=tmp_path)
+    driving = town.lanes.kind == LaneKind.DRIVING
+    limits = set(np.round(town.lanes.speed_limit_mps[driving] * 3.6, 3).tolist())
+    assert limits == {30.0, 50.0, 80.0}
+
+
+def test_a_speed_limit_without_a_number_is_refused(tmp_path):
+    path = sidecar(tmp_path, speed_limits=[{"map_kmh": "fast", "kmh": 50}])
+    with pytest.raises(ValueError, match=r"speed_limits\[0\] needs the numbers map_kmh and kmh"):
+        load(crossing(), tmp_path, signals=path)
