@@ -107,7 +107,8 @@ class _ByReference:
         return int(self.bundle_block.ctypes.data)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(self)  # type: ignore[call-overload]  # never the address
+        fields: Any = self
+        return type(self), tuple(fields)  # never the address, which is this process's own
 
 
 def by_reference(cls: Bundle) -> Bundle:
