@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.dynamics import EgoModel
+from di_envs.world.lights import advance_lights, start_lights
 from di_envs.world.state import TICK_S, Capacity, State, state_dtype, views_of
 from leaderboard.record import Bound
 
@@ -37,7 +39,9 @@ class PerfectDriver:
     acceleration_mps2: float = 3.0
     braking_mps2: float = 3.0
     lateral_mps2: float = 3.0
-    nose_m: float = 2.45  # from the route position to the bumper that stays behind stop lines
+    nose_m: float = (
+        EgoModel().half_length_m
+    )  # from the route position to the bumper that stays behind stop lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +68,6 @@ def light_schedule(town: Town, world_seed: int) -> Iterator[NDArray[np.int8]]:
 
     The array is the same object at every tick.
     """
-    from di_envs.world.lights import advance_lights, start_lights
-
     state = _empty_state(town, world_seed)
     start_lights(state, town.signals)
     while True:
@@ -149,7 +151,7 @@ def _drive(
     goal_m = max(COMPLETE_SHARE * length_m, length_m - COMPLETE_WITHIN_M)
     done_m, speed, ahead, stood = 0.0, 0.0, 0, 0
     table = _Ahead(profile)
-    for tick in range(round(plan.timeout_s / TICK_S)):
+    for tick in range(round(plan.timeout_s / TICK_S) + 1):  # the world ends it once it is over
         colours = next(lights)
         while ahead < len(stops) and done_m > stops[ahead].route_m + 0.5:
             ahead += 1

@@ -51,7 +51,7 @@ def carla_results(run: RunRecord) -> dict[str, Any]:
             "records": records,
         },
         "entry_status": _entry_status(run),
-        "eligible": run.complete,
+        "eligible": run.complete and not run.simulation_crashed,
         "sensors": _sensors(run),
         "values": values,
         "labels": labels,
@@ -61,6 +61,8 @@ def carla_results(run: RunRecord) -> dict[str, Any]:
 def _entry_status(run: RunRecord) -> str:
     if not run.complete:
         return "Finished with missing data" if run.routes else "Started"
+    if run.simulation_crashed:
+        return "Crashed"
     if any("Agent" in record.status for record in run.routes):
         return "Finished with agent errors"
     return "Finished"

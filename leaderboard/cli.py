@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from di_envs.suites import Suite
     from leaderboard.record import RunRecord
 
+EXIT_CRASHED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
@@ -128,7 +129,12 @@ class UsageError(Exception):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command and returns its exit code: 0, 2 for a wrong request, 130 if interrupted."""
+    """Runs one command.
+
+    Returns:
+        The exit code: 0; 1 if a simulation or a worker process died; 2 for a wrong request; 130
+        if interrupted.
+    """
     command: Command = tyro.cli(
         Command,
         prog="driveinsight",
@@ -189,7 +195,9 @@ def _evaluate(command: Evaluate) -> int:
     finally:
         _remove_if_empty(folder)
     _print_run(run, folder)
-    return 0 if run.complete else EXIT_INTERRUPTED
+    if not run.complete:
+        return EXIT_INTERRUPTED
+    return EXIT_CRASHED if run.simulation_crashed else 0
 
 
 def _choose(command: Evaluate) -> tuple[dict[str, Any], Suite]:

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any
 
-from di_envs.route_env import RouteEnv
-
 from agents import load_agent
 from agents.base import Agent, Requirements
+from di_envs.route_env import RouteEnv
 from leaderboard.episode import close_agent, drive_route
 from leaderboard.jobs import Job, RunSpec
 from leaderboard.record import RouteRecord

@@ -23,13 +23,15 @@ from di_envs.world.world import Event, WorldView
 from leaderboard.bound import light_limited_bound
 from leaderboard.episode_hash import EpisodeHash
 from leaderboard.jobs import Job
-from leaderboard.record import EventRecord, RouteRecord
+from leaderboard.record import (
+    AGENT_CRASHED,
+    NOT_SET_UP,
+    SIMULATION_CRASHED,
+    EventRecord,
+    RouteRecord,
+)
 from leaderboard.rules import Rules
 from leaderboard.score import Progress, Score, score_route
-
-NOT_SET_UP = "Failed - Agent couldn't be set up"
-AGENT_CRASHED = "Failed - Agent crashed"
-SIMULATION_CRASHED = "Failed - Simulation crashed"
 
 _LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
 _CONTROL_NAMES = ("throttle", "steer", "brake")

@@ -14,6 +14,11 @@ from typing import Any
 from di_envs.world.state import EventKind
 from leaderboard.score import Score
 
+# CARLA's statuses of routes that code ended, not driving
+NOT_SET_UP = "Failed - Agent couldn't be set up"
+AGENT_CRASHED = "Failed - Agent crashed"
+SIMULATION_CRASHED = "Failed - Simulation crashed"
+
 
 @dataclass(frozen=True, kw_only=True)
 class EventRecord:
@@ -124,3 +129,8 @@ class RunRecord:
     @property
     def complete(self) -> bool:
         return len(self.routes) == self.planned
+
+    @property
+    def simulation_crashed(self) -> bool:
+        """Whether a route is lost to a fault that is not the agent's."""
+        return any(record.status == SIMULATION_CRASHED for record in self.routes)

@@ -53,11 +53,11 @@ def warm_up(spec: RunSpec, console: Console) -> Scene:
     """
     with compile_progress(console), _driver(spec) as driver:
         try:
-            route_ids = tuple(driver.env.unwrapped.route_ids)
+            route_ids = tuple(driver.env.route_ids)
             _drive_a_little(driver, Job(index=0, route_id=route_ids[0], seed=0))
         except (ValueError, OSError) as error:
             raise SetupError(str(error)) from error
-        town = driver.env.unwrapped.view.town
+        town = driver.env.view.town
         return Scene(
             requires=driver.requires,
             town=town.name,
@@ -83,7 +83,7 @@ def _driver(spec: RunSpec) -> Driver:
 def _drive_a_little(driver: Driver, job: Job) -> None:
     """Lets the agent decide once, then holds the brake: these steps run every kernel."""
     observation, _ = driver.env.reset(seed=job.world_seed, options={"route": job.route_id})
-    view = driver.env.unwrapped.view
+    view = driver.env.view
     with suppress(Exception, SystemExit):
         agent = driver.new_agent()
         memory = agent.start(view.plans[view.ego], job.world_seed)

@@ -192,6 +192,13 @@ def test_a_run_cut_short_is_not_eligible_and_says_so():
     assert carla_results(run_of(planned=4))["entry_status"] == "Started"
 
 
+def test_a_run_in_which_a_process_died_is_not_eligible():
+    died = route(status="Failed - Simulation crashed", reason="the worker process was killed")
+    content = carla_results(run_of(died, route(index=1)))
+    assert content["entry_status"] == "Crashed"
+    assert content["eligible"] is False
+
+
 @given(sampled_from(list(EventKind)), floats(0.0, 1e4), floats(-1e4, 1e4))
 def test_a_run_comes_back_from_its_file_as_it_was(kind, value, x):
     run = run_of(route(events=(event(kind, value=value, x=x),)), route(index=1, bound=None))

@@ -15,9 +15,14 @@ from rich.console import Console
 from di_envs.kernels import cpu_capability
 from di_envs.suites import load_suite
 from leaderboard.engines import Engine, PoolEngine, SerialEngine
-from leaderboard.episode import AGENT_CRASHED, NOT_SET_UP, SIMULATION_CRASHED
 from leaderboard.jobs import Job, RunSpec, plan_jobs
-from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.record import (
+    AGENT_CRASHED,
+    NOT_SET_UP,
+    SIMULATION_CRASHED,
+    RouteRecord,
+    RunRecord,
+)
 from leaderboard.results import CARLA_FILE, read_run
 from leaderboard.rules import CARLA_1_0
 from leaderboard.runner import evaluate
