@@ -82,3 +82,18 @@ def kernel(function: Function) -> Function:
     numba.config.CACHE_DIR = str(kernel_cache() / sources_digest(function.__module__))
     compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     return compiled
+
+
+def bind(function: Function, *arguments: Any) -> Function:
+    """The machine code of a kernel for arguments of these types.
+
+    A call then skips the look-up of types, which takes longer than a small kernel's work. The
+    caller answers for passing the same types each time: nothing checks them any more.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled: Any = function
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    compiled.compile(signature)
+    bound: Function = compiled.overloads[signature].entry_point
+    return bound

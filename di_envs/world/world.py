@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.kernels import bind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.dynamics import EgoModel, locate_ego
@@ -153,7 +154,7 @@ class World:
         events: list[Event] = []
         while ticks > 0:
             batch = min(ticks, self._batch)
-            rows = advance(
+            rows = self._advance(
                 state, self._scenery, self._scratch, self._vehicle_end, batch, self._event_rows
             )
             events += [_event(row) for row in self._event_rows[:rows]]
@@ -227,6 +228,15 @@ class World:
         )
         self._batch = 100
         self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * self._batch, COLUMNS))
+        self._advance = bind(
+            advance,
+            self._state,
+            self._scenery,
+            self._scratch,
+            self._vehicle_end,
+            self._batch,
+            self._event_rows,
+        )
         read_only = views_of(self._record)
         for array in read_only:
             array.flags.writeable = False
