@@ -6,12 +6,15 @@ ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-from di_envs.map_chunks import POINTS, MapKind, build_map_chunks
+from di_envs.bundles import by_reference
+from di_envs.kernels import kernel
+from di_envs.map_chunks import POINTS, MapChunks, MapKind, build_map_chunks
 from di_envs.prompt import (
     COMPONENTS,
     LIGHTS,
@@ -21,6 +24,9 @@ from di_envs.prompt import (
     ROUTING_POINTS,
     SPEED_LIMIT_MPS,
     STOP_SIGNS,
+    Prompt,
+    PromptRoute,
+    StopLines,
     empty_prompt,
     fill_prompt,
     prompt_route_of,
@@ -30,7 +36,7 @@ from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
-from di_envs.world.state import SPEED_HISTORY, ActorKind
+from di_envs.world.state import SPEED_HISTORY, ActorKind, State
 from di_envs.world.world import WorldView
 
 _PI = float(np.float32(np.pi))
@@ -92,38 +98,65 @@ def _table(name: str) -> spaces.Box:
     return spaces.Box(np.broadcast_to(low, shape), np.broadcast_to(high, shape), dtype=np.float32)
 
 
+@by_reference
+class Sight(NamedTuple):
+    """All that one look at the world reads and writes: one argument, as each costs time."""
+
+    state: State
+    route: PromptRoute
+    stop_lines: StopLines
+    chunks: MapChunks
+    geo_origin: NDArray[np.float64]  # (2,) latitude, longitude [deg]
+    prompt: Prompt  # written, as are the rest
+    imu: NDArray[np.float32]  # (7,)
+    gnss: NDArray[np.float64]  # (3,)
+
+
+@kernel
+def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no-untyped-def]
+    """Writes the groups that are asked for, for one ego."""
+    if with_prompt:
+        fill_prompt(sight.state, sight.route, sight.stop_lines, sight.chunks, ego, sight.prompt)
+    if with_inertial:
+        fill_imu(sight.state, ego, sight.imu)
+        fill_gnss(sight.state, ego, sight.geo_origin[0], sight.geo_origin[1], sight.gnss)
+
+
 class Observer:
     """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables."""
 
     def __init__(self, town: Town, groups: tuple[str, ...], ego: int = 0) -> None:
-        self._groups = groups
+        self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
         self._ego = ego
-        self._geo_origin = town.geo_origin
-        self._prompt = empty_prompt()
-        self._imu = np.zeros(7, np.float32)
-        self._gnss = np.zeros(3, np.float64)
-        if "prompt" in groups:
-            self._stop_lines = stop_lines_of(town.signals)
-            self._chunks = build_map_chunks(town.lanes)
+        self._stop_lines = stop_lines_of(town.signals)
+        self._chunks = build_map_chunks(town.lanes)
+        self._geo_origin = np.array(town.geo_origin, np.float64)
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""
-        self._state = view.state
-        self._route = prompt_route_of(view.plans[self._ego])
+        self._sight = Sight(
+            state=view.state,
+            route=prompt_route_of(view.plans[self._ego]),
+            stop_lines=self._stop_lines,
+            chunks=self._chunks,
+            geo_origin=self._geo_origin,
+            prompt=empty_prompt(),
+            imu=np.zeros(7, np.float32),
+            gnss=np.zeros(3, np.float64),
+        )
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
+        sight = self._sight
+        fill_observation(sight, self._ego, self._with_prompt, self._with_inertial)
         observation: dict[str, Any] = {}
-        if "prompt" in self._groups:
-            out = self._prompt
-            fill_prompt(self._state, self._route, self._stop_lines, self._chunks, self._ego, out)
-            observation["command"] = out.command[0]
+        if self._with_prompt:
+            prompt = sight.prompt
+            observation["command"] = prompt.command[0]
             for name in COMPONENTS[1:]:
-                observation[name] = getattr(out, name).copy()
+                observation[name] = getattr(prompt, name).copy()
             observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
-        if "inertial" in self._groups:
-            fill_imu(self._state, self._ego, self._imu)
-            fill_gnss(self._state, self._ego, *self._geo_origin, self._gnss)
-            observation["imu"] = self._imu.copy()
-            observation["gnss"] = self._gnss.copy()
+        if self._with_inertial:
+            observation["imu"] = sight.imu.copy()
+            observation["gnss"] = sight.gnss.copy()
         return observation
