@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.expert_line import project
+from agents.expert_line import height_at, project
 from agents.expert_path import STEP_M
 from agents.expert_speed import NO_LIMIT_MPS2, follow, stop_within, time_to
 from di_envs.geometry import wrap_angle
@@ -27,7 +27,9 @@ BLOCKED_GAP_M = 1.5
 PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
 FAR_M = 1e6
 
-_ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
+_ABSENT, _WALKER, _PROP = (
+    int(kind) for kind in (ActorKind.ABSENT, ActorKind.WALKER, ActorKind.PROP)
+)
 
 
 class Sight(NamedTuple):
@@ -164,14 +166,18 @@ def look(sight, path, progress, actors, ways, ego, shift, span, junction, times,
     begin = max(here - int(BACK_M / STEP_M), 0)
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
     for actor in range(actors.kind.size):
-        if actor == ego or actors.kind[actor] == _ABSENT:
+        kind = actors.kind[actor]
+        if actor == ego or kind == _ABSENT or kind == _PROP:  # poles stand off the road
             continue
         dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
-        if dx * dx + dy * dy > reach * reach or abs(actors.z[actor] - actors.z[ego]) > LEVEL_M:
+        if dx * dx + dy * dy > reach * reach:
             continue
         station, offset, yaw = project(path, progress, actors.x[actor], actors.y[actor], begin, end)
+        # Levels are those of the path there: roads climb.
+        if abs(actors.z[actor] - height_at(path, station)) > LEVEL_M:
+            continue
         turn = wrap_angle(actors.yaw[actor] - yaw)
-        if actors.kind[actor] == _WALKER:
+        if kind == _WALKER:
             _note_walker(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
             continue
         _note_vehicle(

@@ -68,7 +68,4 @@ class ExpertConfig:
 
     def numbers(self) -> ExpertNumbers:
         """The form that kernels read."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return ExpertNumbers(
-            **{k: v if isinstance(v, bool) else float(v) for k, v in values.items()}
-        )
+        return ExpertNumbers(*(getattr(self, name) for name in ExpertNumbers._fields))

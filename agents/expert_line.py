@@ -77,6 +77,12 @@ def speed_at(path, station_m):
 
 
 @kernel
+def height_at(path, station_m):
+    """Height of the path at a station."""
+    return path.z[min(max(int(station_m / STEP_M), 0), path.x.size - 1)]
+
+
+@kernel
 def nearest_index(path, x, y, begin, end, stride):
     """The path's base point nearest to a place, among every `stride`-th of [begin, end)."""
     best, found = math.inf, begin

@@ -26,6 +26,7 @@ BEYOND_M = 80.0  # the path goes on behind the route's end, so that nobody brake
 BACK_STEP_M = 12.0  # a lane left again within this length, for the one before, is a step back
 SHORT_LANE_M = 3.0  # lanes so short that points at 1 m may miss them
 CHANGE_ROOM_M = 12.0  # shortest lane change
+BEHIND_START_M = 5.0  # a stop line this far behind the start is still below the tail
 CHANGE_END_M = 2.0  # lane changes end this far before the room for them does
 
 
@@ -75,7 +76,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
         config: Speeds and accelerations.
     """
     lanes = town.lanes
-    legs = join_legs(legs_of(plan, lanes), lanes)
+    legs = join_legs(legs_of(plan), lanes)
     final = legs[-1].end_m - float(plan.lane_m[-1])
     runs, changes_at = _runs(legs, lanes)
     line, leg_rows, jumps = _lay_out(runs, changes_at, lanes)
@@ -87,6 +88,8 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
     curvature = _curvature(yaw)
     legs_array = np.array(leg_rows)
     leg_lane = legs_array[:, 0].astype(np.int32)
+    latest, limits = _change_room(jumps, legs_array, lanes)
+    line_m, signal = _lines(legs_array, town)
     path = DrivePath(
         x=x,
         y=y,
@@ -99,8 +102,13 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
         leg_begin_m=legs_array[:, 1].copy(),
         leg_end_m=legs_array[:, 2].copy(),
         leg_offset_m=legs_array[:, 3].copy(),
-        **_change_rows(jumps, legs_array, lanes),
-        **_line_rows(legs_array, town),
+        change_jump_m=np.array([jump[0] for jump in jumps], np.float64),
+        change_latest_m=latest,
+        change_limit_m=limits,
+        change_shift_m=np.array([jump[1] for jump in jumps], np.float64),
+        line_m=line_m,
+        line_signal=signal,
+        line_kind=town.signals.kind[signal],
         end_m=np.array([end_m]),
     )
     for array in path:
@@ -108,7 +116,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
     return path
 
 
-def legs_of(plan: RoutePlan, lanes: Lanes) -> list[Leg]:
+def legs_of(plan: RoutePlan) -> list[Leg]:
     """The lanes of a dense route in order, without its steps back."""
     legs: list[Leg] = []
     for lane, lane_m in zip(plan.lane.tolist(), plan.lane_m.tolist(), strict=True):
@@ -314,21 +322,20 @@ def _speeds(
     return speed
 
 
-def _change_rows(
+def _change_room(
     jumps: list[tuple[float, float, int]], legs: NDArray[np.float64], lanes: Lanes
-) -> dict[str, NDArray[np.float64]]:
-    """How long each lane change can wait: while the old lane runs beside, and before a junction."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How long each lane change can wait: while the old lane runs beside, and before a junction.
+
+    Returns:
+        Stations by which each must begin, and by which it must have ended.
+    """
     limits = [_room_end(first, shift, legs, lanes) for _, shift, first in jumps]
     latest = []
     for i, limit in enumerate(limits):
         left = sum(1 for j in range(i, len(jumps)) if jumps[j][0] < limit)
         latest.append(max(limit - CHANGE_END_M - left * CHANGE_ROOM_M, jumps[i][0]))
-    return {
-        "change_jump_m": np.array([jump[0] for jump in jumps], np.float64),
-        "change_latest_m": np.array(latest, np.float64),
-        "change_limit_m": np.array(limits, np.float64),
-        "change_shift_m": np.array([jump[1] for jump in jumps], np.float64),
-    }
+    return np.array(latest, np.float64), np.array(limits, np.float64)
 
 
 def _room_end(first: int, shift: float, legs: NDArray[np.float64], lanes: Lanes) -> float:
@@ -340,17 +347,18 @@ def _room_end(first: int, shift: float, legs: NDArray[np.float64], lanes: Lanes)
     return float(legs[-1, 2])
 
 
-def _line_rows(legs: NDArray[np.float64], town: Town) -> dict[str, NDArray[np.generic]]:
-    stations, signals = [], []
+def _lines(legs: NDArray[np.float64], town: Town) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Stations and signals of the stop lines on the path, and of one just behind its start."""
+    lanes, found = town.lanes, []
+    lane, begin, _, offset = legs[0].tolist()
+    if begin - offset < BEHIND_START_M:
+        span = slice(lanes.predecessor_start[int(lane)], lanes.predecessor_start[int(lane) + 1])
+        behind = [int(lanes.stop_line[other]) for other in lanes.predecessor[span]]
+        found += [(offset, line) for line in behind[:1] if line >= 0]
     for lane, _, end, offset in legs.tolist():
-        line = int(town.lanes.stop_line[int(lane)])
-        at_end = abs(end - offset - float(town.lanes.length_m[int(lane)])) < 0.6
-        if line >= 0 and at_end:
-            stations.append(end)
-            signals.append(int(town.signals.stop_signal[line]))
-    kinds = [int(town.signals.kind[signal]) for signal in signals]
-    return {
-        "line_m": np.array(stations, np.float64),
-        "line_signal": np.array(signals, np.int32),
-        "line_kind": np.array(kinds, np.int8),
-    }
+        line = int(lanes.stop_line[int(lane)])
+        if line >= 0 and abs(end - offset - float(lanes.length_m[int(lane)])) < 0.6:
+            found.append((end, line))
+    stations = np.array([station for station, _ in found], np.float64)
+    lines = np.array([line for _, line in found], np.int32)
+    return stations, town.signals.stop_signal[lines].astype(np.int32)

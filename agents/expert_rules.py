@@ -13,6 +13,7 @@ TAIL_M = 1.3  # the red-light rule looks 1 m behind the bumper
 PAST_LINE_M = 0.8  # with the front this far over a line, one is in the junction
 HARD_MPS2 = 5.0  # harder than this one does not brake for a light that is not yet red
 LOOK_M = 120.0
+STANDING_MPS = 0.05
 STOP_NEAR_M = 1.5  # a stop for a sign counts this near the line
 
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
@@ -37,9 +38,9 @@ def light_holds(lights, signal, line_m, front_m, speed, clear_s, numbers):
         clear_s: When the tail would be over the line.
     """
     distance = line_m - front_m
-    if distance < -PAST_LINE_M:
-        return False
     left = seconds_to_red(lights, signal)
+    if distance < -PAST_LINE_M:  # in the junction: go on, unless held there until red
+        return left == 0.0 and speed < STANDING_MPS
     if left > 0.0 and clear_s + numbers.red_margin_s <= left:
         return False
     hardest = numbers.emergency_mps2 if left == 0.0 else HARD_MPS2

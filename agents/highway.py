@@ -17,7 +17,7 @@ import numpy as np
 
 from agents.base import Control, Observation, Requirements, WorldView, make_control
 from agents.expert_control import pedals
-from di_envs.highway import LaneIndex, lane_indices, to_lane, to_obstacle, to_vehicle
+from di_envs.highway import OFF_ROAD, LaneIndex, lane_indices, to_lane, to_obstacle, to_vehicle
 from di_envs.town.lanes import LaneKind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from highway_env.vehicle.behavior import IDMVehicle
 
 LOOK_M = 80.0  # how far away actors are taken over
-LEVEL_M = 3.0
+LEVEL_M = 5.0  # whoever is further above or below is on another level; roads climb
 LEGS_AHEAD = 3
 
 
@@ -176,9 +176,9 @@ class _HighwayTown:
         state, ego = view.state, view.ego
         for actor in range(state.kind.size):
             kind = state.kind[actor]
-            if actor == ego or kind == ActorKind.ABSENT or not _is_near(state, actor, ego):
+            if actor == ego or kind in OFF_ROAD or not _is_near(state, actor, ego):
                 continue
-            if kind in (ActorKind.WALKER, ActorKind.PROP):
+            if kind == ActorKind.WALKER:
                 road.objects.append(to_obstacle(view, actor))
                 continue
             name = self.names.get(int(state.lane[actor]))
