@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from di_envs.bundles import by_reference
-from di_envs.kernels import kernel
+from di_envs.kernels import bind, kernel
 from di_envs.map_chunks import POINTS, MapChunks, MapKind, build_map_chunks
 from di_envs.prompt import (
     COMPONENTS,
@@ -144,11 +144,14 @@ class Observer:
             imu=np.zeros(7, np.float32),
             gnss=np.zeros(3, np.float64),
         )
+        self._fill = bind(
+            fill_observation, self._sight, self._ego, self._with_prompt, self._with_inertial
+        )
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
         sight = self._sight
-        fill_observation(sight, self._ego, self._with_prompt, self._with_inertial)
+        self._fill(sight, self._ego, self._with_prompt, self._with_inertial)
         observation: dict[str, Any] = {}
         if self._with_prompt:
             prompt = sight.prompt

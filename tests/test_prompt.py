@@ -88,6 +88,12 @@ def test_obstacles_are_seen_to_eighty_metres(scene, x, count):
     assert scene.observe()["obstacles"][:, 8].sum() == count
 
 
+def test_poles_are_no_obstacles_as_they_would_give_the_signals_away(scene):
+    scene.put(0, 0.0, 0.0)
+    scene.put(1, 5.0, 0.0, kind=ActorKind.PROP)
+    assert not scene.observe()["obstacles"].any()
+
+
 # ---- lights and signs
 
 
