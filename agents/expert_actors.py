@@ -84,7 +84,9 @@ def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, sh
         beside = min(abs(offset + shift), abs(aside + shift)) - width
         if beside < actors.half_width[ego] + 0.2:
             _note_gap(sight, actors, ego, rear, front, along, progress, numbers)
-    reach = actors.half_width[ego] + width + numbers.side_margin_m
+    reach = actors.half_width[ego] + width
+    if actors.kind[actor] != _PROP:  # poles stand close to where one drives, and stay there
+        reach += numbers.side_margin_m
     if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
         return
     gap = rear - progress.station_m - half
@@ -167,7 +169,7 @@ def look(sight, path, progress, actors, ways, ego, shift, span, junction, times,
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
     for actor in range(actors.kind.size):
         kind = actors.kind[actor]
-        if actor == ego or kind == _ABSENT or kind == _PROP:  # poles stand off the road
+        if actor == ego or kind == _ABSENT:
             continue
         dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
         if dx * dx + dy * dy > reach * reach:
