@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from di_envs.kernels import kernel
 
+LARGEST_M = 60.0  # no two bodies touch whose middles are further apart
 SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels
 
 
@@ -54,6 +55,8 @@ def box_of(state, actor):
 def may_touch(state, a, b):
     """Whether two actors are so near each other that their boxes might overlap."""
     dx, dy = state.x[b] - state.x[a], state.y[b] - state.y[a]
+    if abs(dx) > LARGEST_M or abs(dy) > LARGEST_M:
+        return False
     reach = state.half_length[a] + state.half_width[a]
     reach += state.half_length[b] + state.half_width[b]
     return dx * dx + dy * dy <= reach * reach and abs(state.z[b] - state.z[a]) < SAME_LEVEL_M

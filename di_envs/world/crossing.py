@@ -126,7 +126,7 @@ def may_cross(state, walk, signals, crosswalk, needed_ticks, vehicle_end):
 
 
 @kernel
-def _is_in_the_way(state, actor, x, y, z, step_x, step_y, margin_m):
+def _is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m):
     """Whether a step from (x, y) would go into a vehicle or the second of way ahead of it.
 
     Steps away from its middle are always free, so that nobody is held by a body beside them.
@@ -136,6 +136,7 @@ def _is_in_the_way(state, actor, x, y, z, step_x, step_y, margin_m):
     reach = half_length + look + 2.0
     if abs(dx) > reach or abs(dy) > reach or abs(state.z[actor] - z) >= SAME_LEVEL_M:
         return False
+    step_x, step_y = step_m * math.cos(heading), step_m * math.sin(heading)
     if dx * step_x + dy * step_y <= 0.0:
         return False
     cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
@@ -147,11 +148,11 @@ def _is_in_the_way(state, actor, x, y, z, step_x, step_y, margin_m):
 
 
 @kernel
-def is_blocked(state, actors, x, y, z, step_x, step_y, margin_m):
+def is_blocked(state, actors, x, y, z, heading, step_m, margin_m):
     """Whether one of the first `actors` stands in, or drives into, a walker's next step."""
     for actor in range(actors):
         if is_vehicle(state.kind[actor]) and _is_in_the_way(
-            state, actor, x, y, z, step_x, step_y, margin_m
+            state, actor, x, y, z, heading, step_m, margin_m
         ):
             return True
     return False

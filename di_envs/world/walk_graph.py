@@ -18,8 +18,9 @@ from di_envs.town.town import Town
 from di_envs.world.lane_clearance import clearances
 
 BODY_M = 0.25  # half a walker's width
-KERB_M = 0.4  # that walkers keep from driving lanes
-SIDE_M = 0.5  # that they keep to the right of a line, where there is room
+KERB_M = 0.4  # that walkers keep from driving lanes at least …
+SWING_M = 1.0  # … and where there is room: long vehicles swing out that far in turns
+SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room
 SHORTEST_M = 3.0  # pieces of sidewalk that are worth walking
 STEP_M = 0.5  # spacing of the lines made here
 ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
@@ -143,7 +144,7 @@ def _cut(pieces: list[Line], ends: dict[tuple[int, int], tuple[int, int]]) -> li
 
 
 def _sidewalk(lanes: Lanes, line: Line) -> _Edge:
-    room = float(clearances(lanes, line).min()) - BODY_M - KERB_M
+    room = float(clearances(lanes, line).min()) - BODY_M - SWING_M
     return _Edge(line=line, side_m=min(max(room, 0.0), SIDE_M))
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, uniform
 from di_envs.world.contact import DOWN
@@ -18,12 +17,13 @@ from di_envs.world.state import TICK_S, ActorKind
 
 SLOWEST_MPS, FASTEST_MPS = 0.8, 1.8
 CROSSING_MPS = 1.3  # nobody dawdles on a crosswalk
-KERB_M = 0.4  # from the driving lane at which walkers wait
+KERB_M = 1.0  # from the driving lane at which walkers wait: long vehicles swing out that far
 BESIDE_M = 0.6  # kept behind somebody who walks ahead …
 FOLLOW_M = 1.2  # … and within which one takes on their speed
 MARGIN_M = 0.3  # kept from vehicles
 SQUEEZE_TICKS = round(10.0 / TICK_S)  # of standing still after which that margin is given up
 GIVE_UP_TICKS = round(40.0 / TICK_S)  # of waiting at a kerb after which one turns back
+LOOK_TICKS = round(0.2 / TICK_S)  # between two looks of somebody who waits at a kerb
 LIE_TICKS = round(10.0 / TICK_S)
 HEIGHT_M = 1.7
 SPAWN_TRIES = 8
@@ -32,6 +32,7 @@ SPAWN_ROOM_M = 1.5
 SPAWN_STREAM, PACE_STREAM = int(Stream.WALKER_SPAWN), int(Stream.WALKER_PACE)
 TURN_STREAM = int(Stream.WALKER_TURN)
 ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
+PROP = int(ActorKind.PROP)
 
 
 @kernel
@@ -68,8 +69,10 @@ def place_on_edge(walk, edge, station, direction):
     part = step - k
     a, b = walk.points[walk.first[edge] + k], walk.points[walk.first[edge] + k + 1]
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    side = direction * walk.side_m[edge] / max(math.hypot(dx, dy), 1e-9)
-    yaw = a[3] if direction > 0 else wrap_angle(a[3] + math.pi)
+    side = direction * walk.side_m[edge] / max(math.sqrt(dx * dx + dy * dy), 1e-9)
+    yaw = a[3]  # in [-pi, pi]
+    if direction < 0:
+        yaw += math.pi if yaw < 0.0 else -math.pi
     return a[0] + part * dx - side * dy, a[1] + part * dy + side * dx, a[2] + part * dz, yaw
 
 
@@ -129,13 +132,10 @@ def _road_part(walk, edge, direction):
 @kernel
 def _behind_others(state, walker, first, end, pace):
     """The pace, slowed to that of somebody close ahead on the same edge, going the same way."""
-    edge, direction, at = (
-        state.walk_edge[walker],
-        state.walk_direction[walker],
-        state.walk_m[walker],
-    )
+    edge, direction = state.walk_edge[walker], state.walk_direction[walker]
+    at, edges = state.walk_m[walker], state.walk_edge
     for other in range(first, end):
-        if state.walk_edge[other] != edge or other == walker or state.kind[other] != WALKER:
+        if edges[other] != edge or other == walker or state.kind[other] != WALKER:
             continue
         if state.walk_direction[other] != direction:
             continue
@@ -153,6 +153,8 @@ def _must_wait(state, walk, signals, walker, first, pace):
     at = _travelled(walk, edge, direction, state.walk_m[walker])
     if at > kerb or at + pace * TICK_S < kerb:
         return False
+    if (state.tick[()] + walker) % LOOK_TICKS != 0:  # they do not look all the time
+        return True
     needed_ticks = int((end - kerb) / pace / TICK_S) + 1
     return not may_cross(state, walk, signals, walk.crosswalk[edge], needed_ticks, first)
 
@@ -190,7 +192,7 @@ def _step_towards(state, walk, walker, reach_m):
         walk, state.walk_edge[walker], state.walk_m[walker], state.walk_direction[walker]
     )
     dx, dy = x - state.x[walker], y - state.y[walker]
-    distance = math.hypot(dx, dy)
+    distance = math.sqrt(dx * dx + dy * dy)
     share = 1.0 if distance <= reach_m else reach_m / distance
     state.x[walker] += share * dx
     state.y[walker] += share * dy
@@ -223,15 +225,14 @@ def _stand(state, walker, waiting):
 def _is_held(state, walker, pace, bodies):
     """Whether a vehicle among the first `bodies` actors is in the way of the next step."""
     margin = MARGIN_M if state.still_ticks[walker] < SQUEEZE_TICKS else 0.0
-    step = pace * TICK_S + 0.1
     return is_blocked(
         state,
         bodies,
         state.x[walker],
         state.y[walker],
         state.z[walker],
-        step * math.cos(state.yaw[walker]),
-        step * math.sin(state.yaw[walker]),
+        state.yaw[walker],
+        pace * TICK_S + 0.1,
         margin,
     )
 
@@ -267,6 +268,8 @@ def move_walkers(state, walk, signals, first):
     Actors before `first` are the egos and vehicles that walkers look out for.
     """
     end = state.kind.size
+    while end > first and state.kind[end - 1] == PROP:  # they come last
+        end -= 1
     for walker in range(first, end):
         if state.kind[walker] != WALKER:
             continue
