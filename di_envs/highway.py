@@ -37,6 +37,7 @@ VEHICLES = (
     ActorKind.MOTORCYCLE,
     ActorKind.BICYCLE,
 )
+OFF_ROAD = (ActorKind.ABSENT, ActorKind.PROP)  # props are poles beside the road
 
 
 def lane_indices(town: Town) -> dict[int, LaneIndex]:
@@ -93,7 +94,9 @@ def to_lane(lanes: Lanes, lane: int) -> AbstractLane:
 
 
 def to_highway_road(view: WorldView, network: RoadNetwork | None = None) -> Road:
-    """The scene as a highway-env road: vehicles, egos first, and obstacles for walkers and props.
+    """The scene as a highway-env road: vehicles, egos first, and obstacles for walkers.
+
+    Props are left out: highway-env would stop for poles a metre beside a lane.
 
     Args:
         view: The world.
@@ -120,7 +123,7 @@ def to_highway_road(view: WorldView, network: RoadNetwork | None = None) -> Road
             name = names.get(int(state.lane[actor]))
             if name is not None and name[1] in network.graph.get(name[0], {}):
                 road.vehicles.append(to_vehicle(view, actor, road, name))
-        elif kind != ActorKind.ABSENT:
+        elif kind not in OFF_ROAD:
             road.objects.append(to_obstacle(view, actor))
     return road
 
@@ -150,7 +153,7 @@ def to_vehicle(view: WorldView, actor: int, road: Road, lane_index: LaneIndex) -
 
 
 def to_obstacle(view: WorldView, actor: int) -> Obstacle:
-    """A walker or a prop as an obstacle; it is on no lane until somebody looks."""
+    """A walker as an obstacle; it is on no lane until somebody looks."""
     from highway_env.vehicle.objects import Obstacle
 
     state = view.state

@@ -22,7 +22,7 @@ from di_envs.kernels import kernel
 from di_envs.map_chunks import CELL_M, POINTS, RANGE_M, MapChunks
 from di_envs.town.lanes import SignalKind, Signals
 from di_envs.town.plan import RoutePlan
-from di_envs.world.state import HISTORY_LENGTH, HISTORY_TICKS, SPEED_HISTORY
+from di_envs.world.state import HISTORY_LENGTH, HISTORY_TICKS, SPEED_HISTORY, ActorKind
 
 COMPONENTS = (
     "command",
@@ -46,7 +46,8 @@ LEVEL_M = 3.0  # what is further above or below is on another level
 POSITION_LIMIT_M = 100.0  # coordinates are clipped to this
 SPEED_LIMIT_MPS = 100.0  # speeds are clipped to this
 
-_ABSENT, _NO_OPTION, _LAST_OPTION = 0, 0, 6
+_ABSENT, _PROP = int(ActorKind.ABSENT), int(ActorKind.PROP)
+_NO_OPTION, _LAST_OPTION = 0, 6
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 
 
@@ -254,12 +255,17 @@ def fill_polyline(points, kind, pose, z, out):
 
 @kernel
 def fill_obstacles(state, ego, pose, z, out):
-    """The nearest other actors: x, y, yaw, length, width, vx, vy, kind, valid."""
+    """The nearest others: x, y, yaw, length, width, vx, vy, kind, valid.
+
+    Props are left out: they are the poles of signals, which would give these away.
+    """
     distance = np.empty(OBSTACLES)
     chosen = np.empty(OBSTACLES, np.int64)
     count = 0
     for actor in range(state.kind.size):
-        if actor == ego or state.kind[actor] == _ABSENT or abs(state.z[actor] - z) > LEVEL_M:
+        if state.kind[actor] == _ABSENT or state.kind[actor] == _PROP:
+            continue
+        if actor == ego or abs(state.z[actor] - z) > LEVEL_M:
             continue
         dx, dy = state.x[actor] - pose[0], state.y[actor] - pose[1]
         squared = dx * dx + dy * dy
