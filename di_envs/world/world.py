@@ -17,6 +17,7 @@ from di_envs.world.event_rows import COLUMNS, ROWS_PER_EGO
 from di_envs.world.events import begin_events
 from di_envs.world.lights import start_lights
 from di_envs.world.occupancy import make_occupancy
+from di_envs.world.poles import place_poles
 from di_envs.world.right_of_way import make_requests
 from di_envs.world.spawn import spawn_traffic
 from di_envs.world.state import (
@@ -43,10 +44,9 @@ class WorldConfig:
 
     vehicles: int = 120
     walkers: int = 60
-    props: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("vehicles", "walkers", "props"):
+        for name in ("vehicles", "walkers"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
 
@@ -139,6 +139,7 @@ class World:
             self.config.vehicles,
         )
         spawn_walkers(state, self._walk, first_walker, self.config.walkers)
+        place_poles(state, self.town.signals, first_walker + self.config.walkers)
 
     def advance(self, controls: NDArray[np.float64], ticks: int = 1) -> list[Event]:
         """Holds the egos' controls for some ticks and returns what happened.
@@ -168,7 +169,8 @@ class World:
             town_hash=self.town.content_hash,
             version=STATE_VERSION,
             capacity=view.capacity,
-            record=self._record.copy(),
+            # as bytes: a copy by fields leaves whatever it likes in the gaps between them
+            record=self._record.view(np.uint8).copy().view(self._record.dtype),
             plans=view.plans,
         )
 
@@ -190,14 +192,14 @@ class World:
                 f"{STATE_VERSION} {capacity}; make the world with the same numbers of actors"
             )
         self._allocate(snapshot.plans)
-        self._record[...] = snapshot.record
+        self._record.view(np.uint8)[...] = snapshot.record.view(np.uint8)
 
     def _capacity(self, egos: int) -> Capacity:
         return Capacity(
             egos=egos,
             vehicles=self.config.vehicles,
             walkers=self.config.walkers,
-            props=self.config.props,
+            props=self.town.signals.kind.size,
             junctions=self.town.signals.groups.size,
             signals=self.town.signals.kind.size,
         )
