@@ -23,6 +23,7 @@ SWING_M = 1.0  # … and where there is room: long vehicles swing out that far i
 SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room
 SHORTEST_M = 3.0  # pieces of sidewalk that are worth walking
 STEP_M = 0.5  # spacing of the lines made here
+FINE_M = 0.1  # steps in which the kerb is looked for
 ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
 MEET_M = 0.5  # ends that are the same place
 JOIN_M = 3.0  # ends that a straight line joins
@@ -180,12 +181,20 @@ def _crossings(
         a, b = (pieces[piece][point] for piece, point in (ends[crosswalk, 0], ends[crosswalk, 1]))
         start, end = crosswalks.start[crosswalk], crosswalks.end[crosswalk]
         line = _resample(np.stack((a, start, end, b)))
-        station = np.linspace(0.0, _length(line), len(line))
-        on_road = station[clearances(lanes, line) < 0.0]
-        road = (on_road[0], on_road[-1]) if on_road.size else (station[-1], station[-1])
+        road = _road_part(lanes, line)
         side = min(SIDE_M, max(0.5 * crosswalks.width_m[crosswalk] - BODY_M, 0.0))
         edges.append(_Edge(line=line, side_m=side, crosswalk=crosswalk, road=road))
     return edges
+
+
+def _road_part(lanes: Lanes, line: Line) -> tuple[float, float]:
+    """Stations between which a line lies on driving lanes; its end twice where it never does."""
+    length = _length(line)
+    station = np.linspace(0.0, length, max(round(length / FINE_M), 1) + 1)
+    even = np.linspace(0.0, length, len(line))
+    places = np.stack([np.interp(station, even, line[:, k]) for k in range(3)], axis=1)
+    on_road = station[clearances(lanes, places) < 0.0]
+    return (float(on_road[0]), float(on_road[-1])) if on_road.size else (length, length)
 
 
 def _length(line: Line) -> float:
