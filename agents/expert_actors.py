@@ -21,6 +21,7 @@ LOOK_M, LOOK_S = 35.0, 4.0  # others are looked at within this and the way drive
 BACK_M = 60.0  # of path behind the car, where followers are
 CROSSING_RAD = 0.6  # whoever stands at more than this angle to the path crosses it
 LEADER_BRAKING_MPS2 = 8.0  # what the vehicle ahead may do
+AHEAD_OF_WALKER_S = 1.2  # by which the car is gone before a walker steps onto its path
 SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
 WALKER_LOOK_S = 6.0
 BLOCKED_GAP_M = 1.5
@@ -139,13 +140,13 @@ def _note_walker(sight, actors, actor, ego, station, offset, turn, progress, tim
         return
     meeting = station + along * min(enters, 2.0)
     distance = meeting - body - progress.station_m - half
-    if distance < -half and abs(offset) > actors.half_width[ego] + body:
-        return
+    if distance < 0.0 and abs(offset) > actors.half_width[ego] + body:
+        return  # beside the car: it only gets out of that walker's way by going on
     if station + body < progress.station_m:
         return
     arrives = time_to(times, distance - 0.5)
     gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
-    if arrives > leaves + SPARE_S or gone + SPARE_S < enters:
+    if arrives > leaves + SPARE_S or gone + AHEAD_OF_WALKER_S < enters:
         return
     stop = stop_within(distance - numbers.walker_gap_m, actors.speed[ego], numbers)
     sight.number[BEST] = min(sight.number[BEST], stop)
