@@ -6,6 +6,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from di_envs.kernels import kernel
 
 LARGEST_M = 60.0  # no two bodies touch whose middles are further apart
@@ -26,15 +28,15 @@ class Box(NamedTuple):
 class EgoNow(NamedTuple):
     """What the event rules read of an ego in a tick."""
 
-    index: int
-    tick: int
+    ego: np.int64  # its actor index
+    tick: np.int64
     x: float
     y: float
     z: float
     yaw: float
     speed: float
     half_length: float
-    lane: int  # nearest driving lane, -1 for none
+    lane: np.int64  # nearest driving lane, -1 for none
     lane_m: float
 
 

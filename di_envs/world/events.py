@@ -97,5 +97,5 @@ def detect_events(state, lanes, signals, routes, ego, out, n):
 def _end_route(now, reason, outside_m, out, n):
     """Records the metres outside lanes, if there are any, and why the route ended."""
     if outside_m > 0.0:
-        n = record(out, n, OUTSIDE_LANES, now.index, now.tick, now.x, now.y, now.z, -1, outside_m)
-    return record(out, n, reason, now.index, now.tick, now.x, now.y, now.z, -1, 0.0)
+        n = record(out, n, OUTSIDE_LANES, now.ego, now.tick, now.x, now.y, now.z, -1, outside_m)
+    return record(out, n, reason, now.ego, now.tick, now.x, now.y, now.z, -1, 0.0)

@@ -21,17 +21,17 @@ PARKING_MASK = 1 << int(LaneKind.PARKING)
 
 
 @kernel
-def is_outside_lanes(lanes, ego):
+def is_outside_lanes(lanes, now):
     """Whether the ego's centre is over 1.3 m beyond the nearest driving or parking lane."""
     width, distance = 0.0, math.inf
-    if ego.lane >= 0:
-        width = width_at(lanes, ego.lane, ego.lane_m)
-        x, y, z, _yaw = pose_at(lanes, ego.lane, ego.lane_m)
-        distance = math.sqrt((x - ego.x) ** 2 + (y - ego.y) ** 2 + (z - ego.z) ** 2)
+    if now.lane >= 0:
+        width = width_at(lanes, now.lane, now.lane_m)
+        x, y, z, _yaw = pose_at(lanes, now.lane, now.lane_m)
+        distance = math.sqrt((x - now.x) ** 2 + (y - now.y) ** 2 + (z - now.z) ** 2)
     if distance <= 0.5 * width:  # on its lane: no parking lane could make that an infraction
         return False
     parking, at, _lateral, away = nearest_lane(
-        lanes, ego.x, ego.y, ego.z, PARKING_LOOK_M, np.int64(PARKING_MASK)
+        lanes, now.x, now.y, now.z, PARKING_LOOK_M, np.int64(PARKING_MASK)
     )
     if parking >= 0 and away <= distance:
         distance, width = away, width_at(lanes, parking, at)
@@ -39,9 +39,9 @@ def is_outside_lanes(lanes, ego):
 
 
 @kernel
-def _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong):
+def _is_wrong_lane(lanes, now, lane_yaw, before, before_yaw, wrong):
     """Whether the ego is on a lane against its direction; looked at only when the lane changes."""
-    lane = ego.lane
+    lane = now.lane
     if lanes.junction[lane] >= 0:  # lanes are too tangled there
         return False
     if before < 0:
@@ -49,36 +49,36 @@ def _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong):
     if lanes.road[lane] == lanes.road[before] and lanes.lane_id[lane] == lanes.lane_id[before]:
         return wrong
     if lanes.junction[before] >= 0:
-        return math.cos(lane_yaw - ego.yaw) <= AGAINST_LANE
+        return math.cos(lane_yaw - now.yaw) <= AGAINST_LANE
     # a change between lanes of one direction clears it, whatever it was
     return math.cos(lane_yaw - before_yaw) <= LANE_JUMP and not wrong
 
 
 @kernel
-def watch_lanes(state, lanes, routes, ego, lane_yaw):
+def watch_lanes(state, lanes, routes, now, lane_yaw):
     """Updates the ego's lane flags, and counts the route metres passed while one is up.
 
     Args:
         state: The world; the ego's lane flags and metres change.
         lanes: The town's lanes.
         routes: The egos' routes.
-        ego: The ego now (`EgoNow`).
+        now: The ego now (`EgoNow`).
         lane_yaw: Direction of its lane there [rad].
     """
-    e = ego.index
+    e = now.ego
     wrong = state.wrong_lane[e] != 0
-    if ego.lane >= 0:
+    if now.lane >= 0:
         before, before_yaw = state.lane_before[e], state.lane_before_yaw[e]
-        wrong = _is_wrong_lane(lanes, ego, lane_yaw, before, before_yaw, wrong)
-        state.lane_before[e], state.lane_before_yaw[e] = ego.lane, lane_yaw
-    outside = is_outside_lanes(lanes, ego)
+        wrong = _is_wrong_lane(lanes, now, lane_yaw, before, before_yaw, wrong)
+        state.lane_before[e], state.lane_before_yaw[e] = now.lane, lane_yaw
+    outside = is_outside_lanes(lanes, now)
     state.wrong_lane[e] = 1 if wrong else 0
     state.outside_lane[e] = 1 if outside else 0
 
     first, end = routes.start[e], routes.start[e + 1]
-    now = first + state.outside_index[e]
-    for point in range(now + 1, min(now + WINDOW + 1, end)):
-        if is_past(routes.points, point, ego.x, ego.y):
+    at = first + state.outside_index[e]
+    for point in range(at + 1, min(at + WINDOW + 1, end)):
+        if is_past(routes.points, point, now.x, now.y):
             done = routes.route_m[point] - routes.route_m[first + state.outside_index[e]]
             state.outside_index[e] = point - first
             state.outside_done_m[e] += done

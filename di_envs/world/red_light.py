@@ -39,28 +39,28 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 @kernel
-def _is_near(signals, signal, ego):
+def _is_near(signals, signal, now):
     """Whether the centre of the signal's trigger box is within 15 m of the ego."""
-    dx = signals.box[signal, 0] - ego.x
-    dy = signals.box[signal, 1] - ego.y
-    dz = signals.box[signal, 2] - ego.z
+    dx = signals.box[signal, 0] - now.x
+    dy = signals.box[signal, 1] - now.y
+    dz = signals.box[signal, 2] - now.z
     return dx * dx + dy * dy + dz * dz <= WITHIN_M * WITHIN_M
 
 
 @kernel
-def tail_crosses(ego, x, y, yaw, width_m):
+def tail_crosses(now, x, y, yaw, width_m):
     """Whether the ego's tail lies across the stop line at a pose, in the direction of its lane."""
-    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    cos, sin = math.cos(now.yaw), math.sin(now.yaw)
     line_cos, line_sin = math.cos(yaw), math.sin(yaw)
     if cos * line_cos + sin * line_sin <= 0.0:
         return False
-    near, far = TAIL_FROM * ego.half_length, ego.half_length + TAIL_BEYOND_M
+    near, far = TAIL_FROM * now.half_length, now.half_length + TAIL_BEYOND_M
     side_x, side_y = -line_sin * LINE_HALF_WIDTHS * width_m, line_cos * LINE_HALF_WIDTHS * width_m
     return segments_cross(
-        ego.x - near * cos,
-        ego.y - near * sin,
-        ego.x - far * cos,
-        ego.y - far * sin,
+        now.x - near * cos,
+        now.y - near * sin,
+        now.x - far * cos,
+        now.y - far * sin,
         x - side_x,
         y - side_y,
         x + side_x,
@@ -69,24 +69,24 @@ def tail_crosses(ego, x, y, yaw, width_m):
 
 
 @kernel
-def _tail_is_on(lanes, ego, stop):
+def _tail_is_on(lanes, now, stop):
     """Whether the far end of the tail is on the road and lane of the stop line."""
-    far = ego.half_length + TAIL_BEYOND_M
-    x, y = ego.x - far * math.cos(ego.yaw), ego.y - far * math.sin(ego.yaw)
-    tail = nearest_lane(lanes, x, y, ego.z, TAIL_LOOK_M, np.int64(DRIVING_MASK))[0]
+    far = now.half_length + TAIL_BEYOND_M
+    x, y = now.x - far * math.cos(now.yaw), now.y - far * math.sin(now.yaw)
+    tail = nearest_lane(lanes, x, y, now.z, TAIL_LOOK_M, np.int64(DRIVING_MASK))[0]
     same_road = tail >= 0 and lanes.road[tail] == lanes.road[stop]
     return same_road and lanes.lane_id[tail] == lanes.lane_id[stop]
 
 
 @kernel
-def detect_red_light(state, lanes, signals, ego, out, n):
+def detect_red_light(state, lanes, signals, now, out, n):
     """Records the red lights that the ego's tail is crossing.
 
     Args:
         state: The world; `last_red_signal` changes.
         lanes: The town's lanes.
         signals: The town's signals.
-        ego: The ego now (`EgoNow`).
+        now: The ego now (`EgoNow`).
         out: (N, 8) event rows.
         n: Rows in use.
 
@@ -96,20 +96,20 @@ def detect_red_light(state, lanes, signals, ego, out, n):
     for signal in range(signals.kind.size):
         if state.light[signal] != RED or signals.kind[signal] != LIGHT:
             continue
-        if signal == state.last_red_signal[ego.index]:
+        if signal == state.last_red_signal[now.ego]:
             continue
-        if not _is_near(signals, signal, ego):
+        if not _is_near(signals, signal, now):
             continue
         for line in range(signals.stop_signal.size):
             if signals.stop_signal[line] != signal:
                 continue
             pose = signals.stop_pose[line]
-            crosses = tail_crosses(ego, pose[0], pose[1], pose[3], signals.stop_width_m[line])
-            if crosses and _tail_is_on(lanes, ego, signals.stop_lane[line]):
+            crosses = tail_crosses(now, pose[0], pose[1], pose[3], signals.stop_width_m[line])
+            if crosses and _tail_is_on(lanes, now, signals.stop_lane[line]):
                 pole = signals.pose[signal]
                 n = record(
-                    out, n, RED_LIGHT, ego.index, ego.tick, pole[0], pole[1], pole[2], signal, 0.0
+                    out, n, RED_LIGHT, now.ego, now.tick, pole[0], pole[1], pole[2], signal, 0.0
                 )
-                state.last_red_signal[ego.index] = signal
+                state.last_red_signal[now.ego] = signal
                 break
     return n

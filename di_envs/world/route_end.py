@@ -33,29 +33,29 @@ def _nearest_ahead(points, begin, end, x, y):
 
 
 @kernel
-def has_deviated(state, routes, ego):
+def has_deviated(state, routes, now):
     """Follows the nearest route point; true over 30 m away, or after too long over 15 m away."""
-    first, end = routes.start[ego.index], routes.start[ego.index + 1]
-    now = first + state.deviation_index[ego.index]
-    nearest, distance = _nearest_ahead(routes.points, now, min(now + WINDOW + 1, end), ego.x, ego.y)
+    first, end = routes.start[now.ego], routes.start[now.ego + 1]
+    at = first + state.deviation_index[now.ego]
+    nearest, distance = _nearest_ahead(routes.points, at, min(at + WINDOW + 1, end), now.x, now.y)
     if distance >= SAFE_M:
-        state.deviation_m[ego.index] += routes.route_m[nearest] - routes.route_m[now]
-    state.deviation_index[ego.index] = nearest - first
+        state.deviation_m[now.ego] += routes.route_m[nearest] - routes.route_m[at]
+    state.deviation_index[now.ego] = nearest - first
     allowed_m = DEVIATION_SHARE * routes.route_m[end - 1]
-    return distance >= DEVIATION_M or state.deviation_m[ego.index] > allowed_m
+    return distance >= DEVIATION_M or state.deviation_m[now.ego] > allowed_m
 
 
 @kernel
-def is_blocked(state, ego):
+def is_blocked(state, now):
     """Counts the ticks that the ego has stood; true after more than 180 s."""
-    standing = ego.speed < BLOCKED_BELOW_MPS
-    ticks = state.blocked_ticks[ego.index] + 1 if standing else 0
-    state.blocked_ticks[ego.index] = ticks
+    standing = now.speed < BLOCKED_BELOW_MPS
+    ticks = state.blocked_ticks[now.ego] + 1 if standing else 0
+    state.blocked_ticks[now.ego] = ticks
     return ticks > BLOCKED_TICKS
 
 
 @kernel
-def find_route_end(state, routes, ego):
+def find_route_end(state, routes, now):
     """The EventKind that ends the route in this tick, 0 while it goes on.
 
     Of several at once, completion comes first, then deviation, blocked, timeout. A completed route
@@ -64,16 +64,16 @@ def find_route_end(state, routes, ego):
     Args:
         state: The world; what it remembers for the ends of routes changes.
         routes: The egos' routes.
-        ego: The ego now (`EgoNow`).
+        now: The ego now (`EgoNow`).
     """
-    deviated = has_deviated(state, routes, ego)
-    blocked = is_blocked(state, ego)
-    done_m = state.route_done_m[ego.index]
-    if route_completed(routes, ego.index, done_m, ego.x, ego.y, ego.z):
-        state.route_done_m[ego.index] = routes.route_m[routes.start[ego.index + 1] - 1]
+    deviated = has_deviated(state, routes, now)
+    blocked = is_blocked(state, now)
+    done_m = state.route_done_m[now.ego]
+    if route_completed(routes, now.ego, done_m, now.x, now.y, now.z):
+        state.route_done_m[now.ego] = routes.route_m[routes.start[now.ego + 1] - 1]
         return COMPLETED
     if deviated:
         return DEVIATED
     if blocked:
         return BLOCKED
-    return TIMEOUT if ego.tick * TICK_S > routes.timeout_s[ego.index] else 0
+    return TIMEOUT if now.tick * TICK_S > routes.timeout_s[now.ego] else 0

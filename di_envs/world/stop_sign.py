@@ -48,26 +48,26 @@ def _inside(x, y, z, centre, extent_x, extent_y):
 
 
 @kernel
-def _may_be_ahead(ego, pole, box, extent_x, extent_y):
+def _may_be_ahead(now, pole, box, extent_x, extent_y):
     """Necessary conditions for a sign's box to lie on the lane ahead, quick to check."""
-    dx, dy, dz = pole[0] - ego.x, pole[1] - ego.y, pole[2] - ego.z
+    dx, dy, dz = pole[0] - now.x, pole[1] - now.y, pole[2] - now.z
     if dx * dx + dy * dy + dz * dz > NEAR_M * NEAR_M:
         return False
     # the lane's points start at most the look's width from the ego and reach 20 m
     reach = STEPS_AHEAD * STEP_M + LANE_LOOK_M + extent_x + extent_y
-    return math.hypot(box[0] - ego.x, box[1] - ego.y) < reach
+    return math.hypot(box[0] - now.x, box[1] - now.y) < reach
 
 
 @kernel
-def is_ahead(lanes, signals, ego, sign):
+def is_ahead(lanes, signals, now, sign):
     """Whether the ego, or one of the next 20 m of its lane, is in the sign's trigger box."""
     extent_x, extent_y = _box_extent(signals, sign)
     box = signals.box[sign]
-    if not _may_be_ahead(ego, signals.pose[sign], box, extent_x, extent_y):
+    if not _may_be_ahead(now, signals.pose[sign], box, extent_x, extent_y):
         return False
-    if _inside(ego.x, ego.y, ego.z, box, extent_x, extent_y):
+    if _inside(now.x, now.y, now.z, box, extent_x, extent_y):
         return True
-    lane, station = ego.lane, ego.lane_m
+    lane, station = now.lane, now.lane_m
     for _ in range(STEPS_AHEAD):
         if lane < 0:
             return False
@@ -86,25 +86,25 @@ def is_ahead(lanes, signals, ego, sign):
 
 
 @kernel
-def _find_sign(lanes, signals, ego, lane_yaw):
+def _find_sign(lanes, signals, now, lane_yaw):
     """The first stop sign ahead, -1 where there is none or the ego heads against its lane."""
-    if ego.lane < 0 or math.cos(lane_yaw - ego.yaw) <= 0.0:
+    if now.lane < 0 or math.cos(lane_yaw - now.yaw) <= 0.0:
         return -1
     for sign in range(signals.kind.size):
-        if signals.kind[sign] == STOP and is_ahead(lanes, signals, ego, sign):
+        if signals.kind[sign] == STOP and is_ahead(lanes, signals, now, sign):
             return sign
     return -1
 
 
 @kernel
-def detect_stop_sign(state, lanes, signals, ego, lane_yaw, out, n):
+def detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n):
     """Follows the stop sign ahead and records it when it was run.
 
     Args:
         state: The world; `stop_target`, `stop_done` and `stop_affected` change.
         lanes: The town's lanes.
         signals: The town's signals.
-        ego: The ego now (`EgoNow`).
+        now: The ego now (`EgoNow`).
         lane_yaw: Direction of its lane there [rad].
         out: (N, 8) event rows.
         n: Rows in use.
@@ -112,21 +112,21 @@ def detect_stop_sign(state, lanes, signals, ego, lane_yaw, out, n):
     Returns:
         The number of rows in use.
     """
-    sign = np.int64(state.stop_target[ego.index])
+    sign = np.int64(state.stop_target[now.ego])
     if sign < 0:
-        state.stop_target[ego.index] = _find_sign(lanes, signals, ego, lane_yaw)
+        state.stop_target[now.ego] = _find_sign(lanes, signals, now, lane_yaw)
         return n
-    if ego.speed < STOOD_BELOW_MPS:
-        state.stop_done[ego.index] = 1
+    if now.speed < STOOD_BELOW_MPS:
+        state.stop_done[now.ego] = 1
     pole = signals.pose[sign]
     extent_x, extent_y = _box_extent(signals, sign)
-    if _inside(ego.x, ego.y, ego.z, pole, extent_x, extent_y):
-        state.stop_affected[ego.index] = 1
-    if is_ahead(lanes, signals, ego, sign):
+    if _inside(now.x, now.y, now.z, pole, extent_x, extent_y):
+        state.stop_affected[now.ego] = 1
+    if is_ahead(lanes, signals, now, sign):
         return n
-    if state.stop_done[ego.index] == 0 and state.stop_affected[ego.index] == 1:
-        n = record(out, n, STOP_SIGN, ego.index, ego.tick, pole[0], pole[1], pole[2], sign, 0.0)
-    state.stop_target[ego.index] = -1
-    state.stop_done[ego.index] = 0
-    state.stop_affected[ego.index] = 0
+    if state.stop_done[now.ego] == 0 and state.stop_affected[now.ego] == 1:
+        n = record(out, n, STOP_SIGN, now.ego, now.tick, pole[0], pole[1], pole[2], sign, 0.0)
+    state.stop_target[now.ego] = -1
+    state.stop_done[now.ego] = 0
+    state.stop_affected[now.ego] = 0
     return n
