@@ -98,9 +98,13 @@ def draw_town(axes: Axes, view: WorldView, *, line_width: float) -> None:
             outlines = surfaces(lanes, kind, above)
             if above:  # a rim along both sides, of which the lanes cover all but the outermost
                 sides = [side for outline in outlines for side in np.split(outline, 2)]
-                rim = {"color": "#22262b", "linewidth": 4 * line_width, "capstyle": "butt"}
+                rim: dict[str, Any] = {
+                    "color": "#22262b",
+                    "linewidth": 4 * line_width,
+                    "capstyle": "butt",
+                }
                 axes.add_collection(LineCollection(sides, alpha=0.5, zorder=level - 0.5, **rim))
-            surface = {"facecolor": colour, "edgecolor": colour, "linewidth": 0.3}
+            surface: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "linewidth": 0.3}
             axes.add_collection(PolyCollection(outlines, zorder=level + order, **surface))
         high = chunks.points[:, :, 2].mean(axis=1) > BRIDGE_M
         for kind, style in ((MapKind.BROKEN_LINE, (0, (3, 4))), (MapKind.SOLID_LINE, "solid")):
@@ -170,7 +174,7 @@ def draw_actors(
         where = float(state.x[actor]), float(state.y[actor])
         level = 16.0 if state.z[actor] > BRIDGE_M else 8.0
         if kind == ActorKind.WALKER:
-            marks = {"markeredgecolor": "#30343a", "mew": 0.5, "clip_on": True}
+            marks: dict[str, Any] = {"markeredgecolor": "#30343a", "mew": 0.5, "clip_on": True}
             axes.plot(*where, "o", color=ACTOR[kind], markersize=walker_size, zorder=level, **marks)
             continue
         size = ego_scale if ego else scale
@@ -237,7 +241,7 @@ def town_picture(env: RouteEnv) -> plt.Figure:
     draw_actors(whole, view, scale=1.25, ego_scale=2.2, walker_size=2.2)
     ego = np.array([view.state.x[view.ego], view.state.y[view.ego]])
     corner = ego - np.array(NEAR_M) / 2
-    outline = {"fill": False, "edgecolor": "#222222", "linewidth": 1.4}
+    outline: dict[str, Any] = {"fill": False, "edgecolor": "#222222", "linewidth": 1.4}
     whole.add_patch(Rectangle(tuple(corner), *NEAR_M, zorder=30, **outline))
     frame(near, "Around the ego: lights, traffic, walkers", corner, corner + NEAR_M)
     draw_town(near, view, line_width=1.1)
@@ -254,7 +258,12 @@ def legend() -> list[Any]:
     """What the colours stand for."""
 
     def square(colour: str, label: str) -> Line2D:
-        marks = {"marker": "s", "markersize": 9, "markeredgecolor": "#30343a", "mew": 0.5}
+        marks: dict[str, Any] = {
+            "marker": "s",
+            "markersize": 9,
+            "markeredgecolor": "#30343a",
+            "mew": 0.5,
+        }
         return Line2D([], [], linestyle="", color=colour, label=label, **marks)
 
     return [
