@@ -5,7 +5,7 @@ See `di_envs.town.build_toy` for the town. Lanes are named here by where they le
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -33,10 +33,16 @@ Name = tuple[str, int]
 
 
 class Scene:
-    """The toy town with nobody in it but whom a test puts there: egos, then vehicles, walkers."""
+    """A town with nobody in it but whom a test puts there: egos, then vehicles, walkers."""
 
-    def __init__(self, vehicles: int = 1, walkers: int = 0, plans: tuple[RoutePlan, ...] = ()):
-        self.town = load_town("toy")
+    def __init__(
+        self,
+        vehicles: int = 1,
+        walkers: int = 0,
+        plans: tuple[RoutePlan, ...] = (),
+        town: str = "toy",
+    ):
+        self.town = load_town(town)
         self.world = World(self.town, WorldConfig(vehicles=vehicles, walkers=walkers))
         self.world.reset(0, plans)
         self.egos, self.end = len(plans), len(plans) + vehicles + walkers
@@ -54,7 +60,9 @@ class Scene:
         yield views_of(snapshot.record)
         self.world.restore(snapshot)
 
-    def lane(self, name: Name) -> int:
+    def lane(self, name: Name | int) -> int:
+        if isinstance(name, int):
+            return name
         lanes = self.town.lanes
         road = self.town.road_names.index(name[0])
         (lane,) = np.flatnonzero((lanes.road == road) & (lanes.lane_id == name[1]))
@@ -66,7 +74,7 @@ class Scene:
     def put(
         self,
         actor: int,
-        path: list[Name],
+        path: Sequence[Name | int],
         before_end_m: float,
         speed: float = 0.0,
         kind: ActorKind = ActorKind.CAR,
