@@ -13,7 +13,13 @@ TAIL_M = 1.3  # the red-light rule looks 1 m behind the bumper
 PAST_LINE_M = 0.8  # with the front this far over a line, one is in the junction
 HARD_MPS2 = 5.0  # harder than this one does not brake for a light that is not yet red
 LOOK_M = 120.0
-STANDING_MPS = 0.05
+QUEUE_S = 8.0  # of green and yellow left, below which a queue ahead is not followed over the line
+QUEUE_BRAKING_MPS2 = 4.0  # with which those ahead may stop
+NEVER_S = 1e6
+TAIL_FROM = 0.8  # the rule's tail begins this many half lengths behind the centre
+TAIL_MARGIN_M = 0.1
+CRAWLING_MPS = 3.0
+HOLD_MPS2 = 1.0
 STOP_NEAR_M = 1.5  # a stop for a sign counts this near the line
 
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
@@ -30,52 +36,66 @@ def seconds_to_red(lights, signal):
 
 
 @kernel
-def light_holds(lights, signal, line_m, front_m, speed, clear_s, numbers):
-    """Whether the car must stop for a light: the tail would not be over the line before red.
+def light_acceleration(
+    lights, signal, line_m, station_m, half_length, speed, times, queue, numbers
+):
+    """What a traffic light allows: over its line only if the tail will be over it before red.
 
     Args:
-        line_m: Station of the line. front_m: Station of the car's front.
-        clear_s: When the tail would be over the line.
+        line_m: Station of the line.
+        station_m: Station of the car's centre.
+        times: From `forecast`.
+        queue: (station of the rear, speed) of the vehicle ahead, which the car cannot overtake.
     """
-    distance = line_m - front_m
     left = seconds_to_red(lights, signal)
-    if distance < -PAST_LINE_M:  # in the junction: go on, unless held there until red
-        return left == 0.0 and speed < STANDING_MPS
-    if left > 0.0 and clear_s + numbers.red_margin_s <= left:
-        return False
+    distance = line_m - station_m - half_length
+    if distance < -PAST_LINE_M:
+        return _between_line_and_tail(line_m - station_m, half_length, speed, left)
+    over = line_m + TAIL_M + half_length  # where the centre is once the tail is over
+    room = queue[0] - numbers.standstill_gap_m - over - half_length
+    clear = time_to(times, over - station_m)
+    if room < 0.0:
+        clear = max(clear, -room / max(queue[1], 0.1))
+        if left < QUEUE_S and room + queue[1] * queue[1] / (2.0 * QUEUE_BRAKING_MPS2) < 0.0:
+            clear = NEVER_S  # those ahead may stop, with the car's tail still on the line
+    if clear + numbers.red_margin_s <= left:
+        return NO_LIMIT_MPS2
     hardest = numbers.emergency_mps2 if left == 0.0 else HARD_MPS2
-    return braking_needed(distance + 0.5, speed) <= hardest
+    if braking_needed(distance + 0.5, speed) > hardest:
+        return NO_LIMIT_MPS2
+    return stop_within(distance - numbers.line_margin_m, speed, numbers)
+
+
+@kernel
+def _between_line_and_tail(line_ahead_m, half_length, speed, left_s):
+    """Over the line with the front but not with the tail, a slow car waits for green there."""
+    room = line_ahead_m + TAIL_FROM * half_length - TAIL_MARGIN_M
+    if left_s > 0.0 or room < 0.0 or speed > CRAWLING_MPS:
+        return NO_LIMIT_MPS2
+    needed = braking_needed(room, speed)
+    return NO_LIMIT_MPS2 if needed > HARD_MPS2 else -max(needed, HOLD_MPS2)
 
 
 @kernel
 def line_acceleration(path, progress, lights, speed, half_length, times, queue, numbers):
-    """What the stop lines ahead allow.
-
-    Args:
-        times: From `forecast`.
-        queue: (station of the rear, speed) of the vehicle ahead, which the car cannot overtake.
-    """
+    """What the stop lines ahead allow; arguments as of `light_acceleration`."""
     best = NO_LIMIT_MPS2
-    front = progress.station_m + half_length
+    station = progress.station_m
+    front = station + half_length
     for q in range(progress.line, path.line_m.size):
         line = path.line_m[q]
         if line > front + LOOK_M:
             break
-        distance = line - numbers.line_margin_m - front
         if path.line_kind[q] == _LIGHT:
-            if numbers.ignore_lights:
-                continue
-            over = line + TAIL_M + half_length  # where the centre is once the tail is over
-            clear = time_to(times, over - progress.station_m)
-            ahead = over + half_length - (queue[0] - numbers.standstill_gap_m)
-            if ahead > 0.0:
-                clear = max(clear, ahead / max(queue[1], 0.1))
-            signal = path.line_signal[q]
-            if light_holds(lights, signal, line, front, speed, clear, numbers):
-                best = min(best, stop_within(distance, speed, numbers))
+            if not numbers.ignore_lights:
+                signal = path.line_signal[q]
+                allowed = light_acceleration(
+                    lights, signal, line, station, half_length, speed, times, queue, numbers
+                )
+                best = min(best, allowed)
         elif path.line_kind[q] == _STOP and not (q == progress.line and progress.stopped):
             if line - front > -PAST_LINE_M:
-                best = min(best, stop_within(distance, speed, numbers))
+                best = min(best, stop_within(line - numbers.line_margin_m - front, speed, numbers))
     return best
 
 

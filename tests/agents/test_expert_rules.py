@@ -288,3 +288,28 @@ def test_controls_are_finite_and_in_range_wherever_the_car_is(
 def test_no_stop_is_no_limit():
     assert stop_within(1e6, 10.0, NUMBERS) > 100.0
     assert CONFIG.acceleration_mps2 < NO_LIMIT_MPS2
+
+
+def test_it_does_not_follow_a_crawling_queue_over_the_line_just_before_red():
+    actors = make_actors(1)
+    actors.x[1], actors.speed[1] = 152.0, 2.0  # its rear has just crossed the line
+    lights = make_lights(LightState.GREEN, ticks=round(7.0 / 0.05))  # six seconds to red
+    drive = Drive(make_path(line_m=150.0), actors, lights=lights)
+    drive.place(140.0, 4.0)
+    for _ in range(60):
+        actors.speed[1] = max(actors.speed[1] - 0.05, 0.0)
+        drive.step()
+        lights.phase_ticks[0] += 2
+    assert drive.front < 150.0
+
+
+def test_with_its_tail_on_the_line_at_red_a_crawling_car_waits_for_green():
+    lights = make_lights(LightState.RED)
+    drive = Drive(make_path(line_m=150.0), make_actors(), lights=lights)
+    drive.place(150.0, 1.0)
+    drive.run(10.0)
+    # the rule's tail begins at 0.8 half lengths behind the centre
+    assert drive.x - 0.8 * HALF_M < 150.0
+    lights.light[0], lights.phase_ticks[0] = LightState.GREEN, 0
+    drive.run(5.0)
+    assert drive.x > 160.0
