@@ -13,21 +13,23 @@ from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, uniform
 from di_envs.world.contact import DOWN
 from di_envs.world.crossing import BODY_M, is_blocked, may_cross
+from di_envs.world.personal_space import step_is_free
 from di_envs.world.state import TICK_S, ActorKind
 
 SLOWEST_MPS, FASTEST_MPS = 0.8, 1.8
 CROSSING_MPS = 1.3  # nobody dawdles on a crosswalk
 KERB_M = 1.0  # from the driving lane at which walkers wait: long vehicles swing out that far
-BESIDE_M = 0.6  # kept behind somebody who walks ahead …
+BESIDE_M = 0.8  # kept behind somebody who walks ahead …
 FOLLOW_M = 1.2  # … and within which one takes on their speed
 MARGIN_M = 0.3  # kept from vehicles
 SQUEEZE_TICKS = round(10.0 / TICK_S)  # of standing still after which that margin is given up
 GIVE_UP_TICKS = round(40.0 / TICK_S)  # of waiting at a kerb after which one turns back
 LOOK_TICKS = round(0.2 / TICK_S)  # between two looks of somebody who waits at a kerb
+PATIENCE_TICKS = round(2.0 / TICK_S)  # with others in the way; some have up to twice as much
 LIE_TICKS = round(10.0 / TICK_S)
 HEIGHT_M = 1.7
 SPAWN_TRIES = 8
-SPAWN_ROOM_M = 1.5
+SPAWN_ROOM_M = 2.0  # from the middle of an edge, so half of it is left beside it
 
 SPAWN_STREAM, PACE_STREAM = int(Stream.WALKER_SPAWN), int(Stream.WALKER_PACE)
 TURN_STREAM = int(Stream.WALKER_TURN)
@@ -53,10 +55,12 @@ def _sidewalk_at(walk, share):
 
 
 @kernel
-def _is_free(state, first, walker, edge, station):
+def _is_free(state, walk, first, walker, edge, station):
+    x, y, _, _ = place_on_edge(walk, edge, station, 1)
     for other in range(first, walker):
-        if state.kind[other] == WALKER and state.walk_edge[other] == edge:
-            if abs(state.walk_m[other] - station) < SPAWN_ROOM_M:
+        if state.kind[other] == WALKER:
+            dx, dy = state.x[other] - x, state.y[other] - y
+            if dx * dx + dy * dy < SPAWN_ROOM_M * SPAWN_ROOM_M:
                 return False
     return True
 
@@ -87,7 +91,7 @@ def spawn_walkers(state, walk, first, count):
         state.kind[walker] = ABSENT
         for attempt in range(SPAWN_TRIES):
             edge, station = _sidewalk_at(walk, uniform(seed, SPAWN_STREAM, attempt, walker))
-            if edge >= 0 and _is_free(state, first, walker, edge, station):
+            if edge >= 0 and _is_free(state, walk, first, walker, edge, station):
                 _stand_up(state, walk, walker, edge, station)
                 break
 
@@ -186,21 +190,28 @@ def _go_on(state, walk, walker):
 
 
 @kernel
-def _step_towards(state, walk, walker, reach_m):
-    """Moves the body towards its place, at most `reach_m`: corners are cut, not leapt."""
+def _step_towards(state, walk, walker, reach_m, first, end):
+    """Moves the body towards its place, at most `reach_m`: corners are cut, not leapt.
+
+    Returns:
+        Whether it could; not where another walker is in the way.
+    """
     x, y, z, yaw = place_on_edge(
         walk, state.walk_edge[walker], state.walk_m[walker], state.walk_direction[walker]
     )
     dx, dy = x - state.x[walker], y - state.y[walker]
     distance = math.sqrt(dx * dx + dy * dy)
     share = 1.0 if distance <= reach_m else reach_m / distance
-    state.x[walker] += share * dx
-    state.y[walker] += share * dy
+    x, y = state.x[walker] + share * dx, state.y[walker] + share * dy
+    if not step_is_free(state, walker, first, end, x, y):
+        return False
+    state.x[walker], state.y[walker] = x, y
     state.z[walker] = z
     state.yaw[walker] = yaw
     speed = share * distance / TICK_S
     state.acceleration[walker] = (speed - state.speed[walker]) / TICK_S
     state.speed[walker] = speed
+    return True
 
 
 @kernel
@@ -253,12 +264,20 @@ def _walk_on(state, walk, signals, walker, first, end):
     if pace <= 0.0 or _is_held(state, walker, pace, bodies):
         _stand(state, walker, 0)
         return
-    state.walk_waiting[walker] = 0
-    state.still_ticks[walker] = 0
+    station = state.walk_m[walker]
     state.walk_m[walker] += direction * pace * TICK_S
     if not 0.0 <= state.walk_m[walker] <= walk.length_m[edge]:
         _go_on(state, walk, walker)
-    _step_towards(state, walk, walker, 2.0 * pace * TICK_S)
+    if _step_towards(state, walk, walker, 2.0 * pace * TICK_S, first, end):
+        state.walk_waiting[walker] = 0
+        state.still_ticks[walker] = 0
+        return
+    state.walk_edge[walker], state.walk_m[walker] = edge, station
+    state.walk_direction[walker] = direction
+    _stand(state, walker, 0)
+    share = uniform(state.seed[()], PACE_STREAM, 1, walker)
+    if state.still_ticks[walker] > (1.0 + share) * PATIENCE_TICKS:
+        _turn_back(state, walker)
 
 
 @kernel

@@ -24,6 +24,7 @@ from di_envs.town.loading import load_town
 from di_envs.world.contact import DOWN
 from di_envs.world.crossing import could_stop, ticks_to_green
 from di_envs.world.lane_clearance import clearances
+from di_envs.world.personal_space import CLEAR_M
 from di_envs.world.state import TICK_S, ActorKind
 from di_envs.world.walk_graph import build_walk_graph
 from di_envs.world.walkers import (
@@ -218,14 +219,40 @@ def test_a_fast_walker_does_not_walk_into_a_slow_one():
     state = make_state(walkers=2)
     spawn_walkers(state, walk, 1, 2)
     edge = int(np.flatnonzero(walk.length_m == 80.0)[0])
-    state.walk_edge[1:], state.walk_direction[1:] = edge, 1
-    state.walk_m[1:], state.desired_factor[1:] = (10.0, 5.0), (0.8, 1.8)
+    state.desired_factor[1:] = 0.8, 1.8
+    for walker, station in ((1, 10.0), (2, 5.0)):
+        state.walk_edge[walker], state.walk_m[walker] = edge, station
+        state.walk_direction[walker] = 1
+        place = place_on_edge(walk, edge, station, 1)
+        state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
     for _ in range(1000):
         state.tick[()] += 1
         move_walkers(state, walk, NO_SIGNALS, 1)
-        assert state.walk_m[1] - state.walk_m[2] > 0.5
+        assert state.walk_m[1] - state.walk_m[2] > CLEAR_M
     assert state.walk_m[1] == pytest.approx(50.0)
     assert state.walk_m[2] > 47.0
+
+
+def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_one_turns_back():
+    walk = build_walk_graph(OPEN)
+    walk = walk._replace(side_m=np.zeros_like(walk.side_m))
+    state = make_state(walkers=2)
+    spawn_walkers(state, walk, 1, 2)
+    edge = int(np.flatnonzero(walk.length_m == 80.0)[0])
+    state.desired_factor[1:] = 1.0
+    for walker, station, direction in ((1, 10.0, 1), (2, 20.0, -1)):
+        state.walk_edge[walker], state.walk_m[walker] = edge, station
+        state.walk_direction[walker] = direction
+        place = place_on_edge(walk, edge, station, direction)
+        state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
+    gaps = []
+    for _ in range(300):
+        state.tick[()] += 1
+        move_walkers(state, walk, NO_SIGNALS, 1)
+        gaps.append(abs(state.x[1] - state.x[2]))
+    assert CLEAR_M <= min(gaps) < CLEAR_M + 0.1
+    assert state.walk_direction[1] == state.walk_direction[2]
+    assert state.speed[1:].min() > 0.9
 
 
 def test_walkers_turn_round_where_a_sidewalk_ends():
