@@ -1,0 +1,79 @@
+"""The examples run as they are, and print what they teach."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from agents import load_agent
+from agents.base import Track
+from leaderboard.driver import Driver
+from leaderboard.jobs import Job, RunSpec
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+
+def printed(name):
+    """What an example prints, run as a user would; warnings are errors there too."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(EXAMPLES / name)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def number(pattern, text):
+    found = re.search(pattern, text)
+    assert found, f"no {pattern!r} in:\n{text}"
+    return float(found[1])
+
+
+def test_every_example_is_run_here():
+    text = Path(__file__).read_text(encoding="utf-8")
+    for path in EXAMPLES.glob("*.py"):
+        assert f'"{path.name}"' in text, path.name
+
+
+def test_driving_a_route_returns_its_score_in_metres():
+    text = printed("drive_a_route.py")
+    score = number(r"driving score ([\d.]+)", text)
+    assert "ended by: completed" in text
+    assert score > 90.0
+    # the claim of the example: return = length x score / 100
+    length_m = number(r"m of ([\d.]+) m", text)
+    shown_to = 0.05 * (1.0 + length_m / 100.0)  # half a unit of the last digit of each
+    assert number(r"return ([\d.]+) m", text) == pytest.approx(
+        length_m * score / 100.0, abs=2.0 * shown_to
+    )
+
+
+def test_branches_differ_by_their_control_alone():
+    text = printed("save_branch_restore.py")
+    assert "same branch, same bits: True" in text
+    assert "other control, other bits: True" in text
+    assert number(r"go on +speed after 4 s: +([\d.]+)", text) > 1.0
+    assert number(r"brake +speed after 4 s: +([\d.]+)", text) == 0.0
+
+
+def test_an_agent_of_ones_own_completes_a_route():
+    text = printed("your_own_agent.py")
+    assert "ended by: completed" in text
+    assert number(r"driving score ([\d.]+)", text) > 60.0
+
+
+def test_the_agent_of_the_example_is_scored_by_its_path():
+    spec = f"{EXAMPLES / 'your_own_agent.py'}:RouteFollower"
+    agent = load_agent(spec)
+    assert agent.requires.track == Track.PROMPT
+    with Driver(RunSpec(agent=spec, options={"suite": "town05_tiny"})) as driver:
+        record = driver.drive(Job(index=0, route_id=driver.env.route_ids[0], seed=0))
+    assert record.reason == ""
+    assert record.score.route_completion > 60.0
