@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 LaneIndex = tuple[str, str, int]
 
 STRAIGHT_WITHIN_M = 0.02  # lanes that bend less become straight ones, which are faster there
-SHORTEST_CURVE_M = 2.0  # highway-env's curves need two samples a metre apart
 VEHICLES = (
     ActorKind.CAR,
     ActorKind.VAN,
@@ -76,21 +75,20 @@ def to_road_network(town: Town, only: Iterable[int] | None = None) -> RoadNetwor
 
 def to_lane(lanes: Lanes, lane: int) -> AbstractLane:
     """A lane of ours as a highway-env lane: straight if it is, else through its points."""
-    from highway_env.road.lane import PolyLaneFixedWidth, StraightLane
+    from highway_env.road.lane import StraightLane
+
+    from di_envs.highway_lane import SampledLane
 
     first, count = int(lanes.first[lane]), int(lanes.count[lane])
-    points = lanes.points[first : first + count, :2]
+    points = lanes.points[first : first + count]
     width = float(lanes.width_m[first : first + count].mean())
     limit = float(lanes.speed_limit_mps[lane])
-    start, end = points[0], points[-1]
-    chord = end - start
-    length = float(np.hypot(*chord))
-    offsets = points - start
-    across = np.abs(chord[0] * offsets[:, 1] - chord[1] * offsets[:, 0]) / max(length, 1e-9)
-    short = float(lanes.length_m[lane]) < SHORTEST_CURVE_M
-    if length > 1e-3 and (short or float(across.max()) < STRAIGHT_WITHIN_M):
+    start, end = points[0, :2], points[-1, :2]
+    chord, offsets = end - start, points[:, :2] - start
+    across = np.abs(chord[0] * offsets[:, 1] - chord[1] * offsets[:, 0])
+    if float(across.max()) < STRAIGHT_WITHIN_M * float(np.hypot(*chord)):
         return StraightLane(start.copy(), end.copy(), width=width, speed_limit=limit)
-    return PolyLaneFixedWidth([tuple(point) for point in points.tolist()], width, speed_limit=limit)
+    return SampledLane(points[:, (0, 1, 3)], width, limit)
 
 
 def to_highway_road(view: WorldView, network: RoadNetwork | None = None) -> Road:
