@@ -17,17 +17,23 @@ from di_envs.world.world import World, WorldConfig
 
 MINUTES = 10
 VEHICLES, WALKERS = 120, 60
+_ABSENT, _WALKER, _PROP = int(ActorKind.ABSENT), int(ActorKind.WALKER), int(ActorKind.PROP)
 
 
 @kernel
 def overlapping_pair(kind, x, y, z, yaw, half_length, half_width):
-    """The first two actors whose boxes overlap at one level, or (-1, -1)."""
+    """The first two actors whose boxes overlap at one level, or (-1, -1).
+
+    Walkers and poles are left out: a pole may stand on a sidewalk, and walkers slip past it.
+    """
     for a in range(kind.size):
         for b in range(a + 1, kind.size):
             dx, dy = x[a] - x[b], y[a] - y[b]
             if dx * dx + dy * dy > 150.0 or abs(z[a] - z[b]) > 3.0:
                 continue
-            if kind[a] == 0 or kind[b] == 0:
+            if kind[a] == _ABSENT or kind[b] == _ABSENT or kind[a] == _PROP:
+                continue
+            if kind[a] == _WALKER and kind[b] == _PROP:
                 continue
             if boxes_overlap(
                 x[a], y[a], yaw[a], half_length[a], half_width[a],
