@@ -296,6 +296,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
     for actor in range(egos, vehicle_end):
         if state.kind[actor] == _ABSENT:
             continue
+        held = state.grant[actor]
         _release_grant(state, lanes, actor)
         speed = state.speed[actor]
         reach = 10.0 + 1.5 * speed + speed * speed / (2.0 * REQUEST_BRAKING_MPS2)
@@ -311,7 +312,8 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
             if state.grant[actor] == way and _can_stop(speed, distance):
                 state.grant[actor] = -1
             continue
-        if state.grant[actor] >= 0 or _waits_behind(state, ahead, actor, distance):
+        # who has just given up a grant asks from the next tick on: it is still in a holders' list
+        if held >= 0 or _waits_behind(state, ahead, actor, distance):
             continue
         waited = tick - state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else 0
         priority = _priority(state, lanes, signals, approach, way, waited)

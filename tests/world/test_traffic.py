@@ -12,11 +12,15 @@ from hypothesis import strategies as st
 from toy_scene import (
     EAST_TO_1,
     EAST_TO_2,
+    EAST_TO_2_RIGHT,
+    FROM_EAST_RIGHT,
     FROM_EAST_STRAIGHT,
     FROM_WEST_LEFT,
     FROM_WEST_STRAIGHT,
     MIDDLE_LEFT,
     MIDDLE_RIGHT,
+    MIDDLE_RIGHT_AT_1,
+    MIDDLE_TO_1,
     MIDDLE_TO_2,
     NORTH_STRAIGHT,
     WEST_TO_1,
@@ -263,6 +267,23 @@ def test_two_ways_that_cross_are_never_driven_at_once():
         scene.put(1, [EAST_TO_2, FROM_EAST_STRAIGHT], float(gap_m), speed=10.0)
         for state in scene.run(12.0):
             assert not _touch(state, 0, 1)
+
+
+def test_a_car_that_gets_its_next_grant_does_not_hide_others_who_hold_its_last_one():
+    """Car 2 leaves junction 2 so fast that it is let into junction 1 in the same tick; car 1 still
+    comes from the east by the same way, and car 0 would cross it."""
+    scene = Scene(vehicles=3)
+    scene.put(0, [WEST_TO_2, FROM_WEST_LEFT], 3.0)
+    scene.put(1, [EAST_TO_2_RIGHT, FROM_EAST_RIGHT], 12.0, speed=5.0)
+    scene.put(2, [MIDDLE_TO_1, MIDDLE_RIGHT_AT_1], scene.room(MIDDLE_TO_1) - 3.9, speed=14.0)
+    scene.show("1", 2)
+    shared = scene.lane(FROM_EAST_RIGHT)
+    with scene.edit() as state:
+        state.grant[1:3] = state.previous_lane[2] = shared
+    for _ in scene.run(0.2):
+        pass
+    assert scene.state.grant[2] == scene.lane(MIDDLE_RIGHT_AT_1)
+    assert scene.state.grant.tolist()[:2] == [-1, shared]
 
 
 # walkers
