@@ -19,7 +19,7 @@ from agents.expert_junction import crossing_acceleration, exit_acceleration, jun
 from agents.expert_line import Progress, localise
 from agents.expert_path import CHANGE_END_M, CHANGE_ROOM_M
 from agents.expert_rules import line_acceleration, next_line, stops_here
-from agents.expert_speed import NO_LIMIT_MPS2, cruise, forecast, stop_within
+from agents.expert_speed import cruise, forecast, stop_within
 from di_envs.kernels import kernel
 
 FORECAST_M = 100
@@ -165,6 +165,3 @@ def decide(path, progress, actors, ways, lights, ego, numbers, model):
     throttle, brake = pedals(best, speed, model)
     steer = steering(path, progress, x, y, yaw, speed, model)
     return throttle, steer, brake, progress
-
-
-__all__ = ["NO_LIMIT_MPS2", "decide", "start_progress"]
