@@ -2,9 +2,9 @@
 """Who may enter a junction: a vehicle goes in only with a grant for its way through.
 
 A grant is given when the light is green or the stop has been made, when nobody who holds a grant
-for a crossing way, and no ego, is in the way, and when the exit has room, so that nobody ever stands
-in a junction and no gridlock forms. Those who have priority are served first, then those who
-arrived first; a vehicle that waits its turn keeps later ones from overtaking it.
+for a crossing way, and no ego, is in the way, and when the exit has room, so that nobody ever
+stands in a junction and no gridlock forms. Those who have priority are served first, then those
+who arrived first; a vehicle that waits its turn keeps later ones from overtaking it.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ class Requests(NamedTuple):
     distance_m: NDArray[np.float64]  # (A,) from the front to the stop line, negative once past it
     way: NDArray[np.int32]  # (A,) junction lane ahead, -1 for none near
     way_step: NDArray[np.int32]  # (A,) its place in the vehicle's path
+    full: NDArray[np.int8]  # (A,) 1 for who may not go because the exit has no room
     queue: NDArray[np.int32]  # (A,) those who ask, in order of their turn
     rank: NDArray[np.int64]  # (A,) the order: priority, then arrival
 
@@ -51,6 +52,7 @@ def make_requests(actors: int) -> Requests:
         distance_m=np.zeros(actors),
         way=np.full(actors, -1, np.int32),
         way_step=np.zeros(actors, np.int32),
+        full=np.zeros(actors, np.int8),
         queue=np.zeros(actors, np.int32),
         rank=np.zeros(actors, np.int64),
     )
@@ -239,10 +241,10 @@ def _exit_has_room(occupancy, state, lanes, actor, way_step):
 @kernel
 def _blocked_by_queue(requests, lanes, way, waiting):
     """Whether somebody whose turn comes earlier waits for a way that meets this one."""
+    blocked = False
     for i in range(waiting):
-        if ways_conflict(lanes, way, requests.way[requests.queue[i]]):
-            return True
-    return False
+        blocked = blocked or ways_conflict(lanes, way, requests.way[requests.queue[i]])
+    return blocked
 
 
 @kernel
@@ -258,6 +260,7 @@ def give_grants(requests, occupancy, state, lanes, signals, egos, asking):
         actor = requests.queue[i]
         way = requests.way[actor]
         if not _exit_has_room(occupancy, state, lanes, actor, requests.way_step[actor]):
+            requests.full[actor] = 1
             continue
         after = requests.rank[actor] >= (np.int64(1) << 40)
         if (
@@ -292,6 +295,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         ahead: The vehicles' leaders of this tick (`traffic.Leaders`).
     """
     tick = state.tick[()]
+    requests.full[:] = 0
     asking = 0
     for actor in range(egos, vehicle_end):
         if state.kind[actor] == _ABSENT:

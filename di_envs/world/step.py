@@ -20,7 +20,13 @@ from di_envs.world.occupancy import Occupancy, fill_occupancy
 from di_envs.world.progress import advance_progress
 from di_envs.world.right_of_way import Requests, note_ego_arrival, update_grants
 from di_envs.world.state import ActorKind, Routes
-from di_envs.world.traffic import Leaders, choose_speed, find_leaders, move_vehicle
+from di_envs.world.traffic import (
+    Leaders,
+    choose_speed,
+    find_leaders,
+    move_vehicle,
+    take_another_way,
+)
 from di_envs.world.traffic_tables import TrafficTables
 from di_envs.world.walk_graph import WalkGraph
 from di_envs.world.walkers import mark_busy_crosswalks, move_walkers
@@ -100,6 +106,7 @@ def _move_traffic(state, scenery, scratch, egos, vehicle_end):
     change_lanes(occupancy, state, lanes, tables, egos, vehicle_end)
     find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end)
     update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end, leaders)
+    take_another_way(state, lanes, tables, requests, egos, vehicle_end)
     for actor in range(egos, vehicle_end):
         if state.kind[actor] != _ABSENT:
             scratch.acceleration[actor], scratch.cap[actor] = choose_speed(

@@ -42,6 +42,8 @@ LATERAL_SPEED_MPS = 1.2  # of a lane change
 LATERAL_SHARE = 0.25  # of the forward speed, at most
 INDICATE_M = 30.0
 BRAKE_LIGHT_MPS2 = -0.8
+REROUTE_TICKS = round(20.0 / TICK_S)  # of standing still after which one leaves a full exit …
+REROUTE_EVERY_TICKS = round(2.0 / TICK_S)  # … to others, if the next draw is another way
 
 _ABSENT = int(ActorKind.ABSENT)
 _DRIVING = int(LaneKind.DRIVING)
@@ -243,6 +245,19 @@ def choose_path(state, lanes, tables, actor, known):
 
 
 @kernel
+def take_another_way(state, lanes, tables, requests, egos, vehicle_end):
+    """Who has long stood before a full exit draws a new path: so a ring of full streets dissolves.
+
+    In such a ring everybody waits for room in the next street, and none of them for a mistake.
+    """
+    for actor in range(egos, vehicle_end):
+        still = state.still_ticks[actor]
+        if requests.full[actor] and still >= REROUTE_TICKS and still % REROUTE_EVERY_TICKS == 0:
+            if requests.way_step[actor] == 1 and state.grant[actor] < 0:
+                choose_path(state, lanes, tables, actor, 1)
+
+
+@kernel
 def move_vehicle(state, lanes, tables, actor, acceleration, cap):
     """Moves a vehicle along its path for one tick and places its body."""
     speed = state.speed[actor]
@@ -312,8 +327,8 @@ def _indicator(state, lanes, actor):
 def place_vehicle(state, lanes, actor):
     """Sets a vehicle's pose: its axles run on the lane, so long bodies swing as they do."""
     axle = 0.6 * state.half_length[actor]
-    front_x, front_y, front_z, front_yaw = _point_on_path(state, lanes, actor, axle)
-    rear_x, rear_y, rear_z, rear_yaw = _point_on_path(state, lanes, actor, -axle)
+    front_x, front_y, front_z, _ = _point_on_path(state, lanes, actor, axle)
+    rear_x, rear_y, rear_z, _ = _point_on_path(state, lanes, actor, -axle)
     yaw = math.atan2(front_y - rear_y, front_x - rear_x)
     lateral = state.lateral_m[actor]
     if lateral != 0.0:

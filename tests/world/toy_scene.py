@@ -16,8 +16,8 @@ from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State, views_of
 from di_envs.world.traffic import place_vehicle
 from di_envs.world.world import World, WorldConfig
 
-# The western street, driven north and east to junction 1 (lights), its left lane
-WEST_TO_1 = ("11", 1)
+# The western street, driven north and east to junction 1 (lights): left and right lane
+WEST_TO_1, WEST_TO_1_RIGHT = ("11", 1), ("11", 2)
 # … and west, south and east along the south side to junction 2 (the major road there)
 WEST_TO_2, WEST_TO_2_RIGHT = ("11", -1), ("11", -2)
 EAST_TO_1, EAST_TO_2, EAST_TO_2_RIGHT = ("12", 1), ("12", -1), ("12", -2)
@@ -27,7 +27,8 @@ MIDDLE_RIGHT, MIDDLE_LEFT = ("2016", -1), ("2017", -1)
 FROM_WEST_STRAIGHT, FROM_WEST_LEFT, FROM_EAST_STRAIGHT = ("2012", -1), ("2013", -1), ("2014", -1)
 FROM_EAST_RIGHT = ("2015", -1)
 # Ways through junction 1
-NORTH_STRAIGHT, MIDDLE_RIGHT_AT_1 = ("2003", -1), ("2008", -1)
+NORTH_STRAIGHT, NORTH_STRAIGHT_RIGHT, NORTH_RIGHT = ("2003", -1), ("2003", -2), ("2004", -1)
+MIDDLE_RIGHT_AT_1 = ("2008", -1)
 
 Name = tuple[str, int]
 
