@@ -44,9 +44,8 @@ def advance_lights(state, signals):
             state.phase_ticks[junction] += 1
             if state.phase_ticks[junction] >= TURN_TICKS:
                 state.phase_ticks[junction] = 0
-                state.phase_group[junction] = (
-                    state.phase_group[junction] + 1
-                ) % signals.groups[junction]
+                following = state.phase_group[junction] + 1
+                state.phase_group[junction] = following % signals.groups[junction]
     show_lights(state, signals)
 
 

@@ -127,7 +127,7 @@ def _insert_free_body(occupancy, state, lanes, actor):
 
 @kernel
 def body_ahead(occupancy, lane, actor, s):
-    """The first body on a lane, not the actor's own, whose middle lies ahead of station s; or -1."""
+    """The first body on a lane, not the actor's own, with its middle ahead of station s; or -1."""
     body = occupancy.first[lane]
     while body >= 0:
         if occupancy.actor[body] != actor:
