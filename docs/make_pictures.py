@@ -348,7 +348,8 @@ def _draw_obstacles(axes: Axes, obstacles: NDArray[np.float32]) -> None:
             continue
         walker = kind == ActorKind.WALKER
         # ahead is up: a right-handed picture of a left-handed frame, so yaw counts from the top
-        outline = box(y, x, np.pi / 2 - yaw, length / 2, width / 2)
+        size = (0.6, 0.6) if walker else (length / 2, width / 2)  # walkers larger, to be seen
+        outline = box(y, x, np.pi / 2 - yaw, *size)
         label = "obstacles: walkers" if walker else "obstacles: vehicles"
         colour = "#e0a800" if walker else "#7d8794"
         axes.add_patch(

@@ -1,0 +1,62 @@
+"""Prints finished runs as one Markdown table, such as the README's.
+
+driveinsight evaluate --agent expert --suite town05_short --seeds 3
+python benchmarks/score_table.py results/*
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from leaderboard.confidence import mean_interval
+from leaderboard.record import RunRecord
+from leaderboard.report import driving_interval, mean_bound, seed_means
+from leaderboard.results import ResultsError, read_run
+from leaderboard.rules import rules_named
+
+HEADER = (
+    "| agent | track | suite | DS | RC | IS | bound | infractions a km |",
+    "|---|---|---|---:|---:|---:|---:|---:|",
+)
+
+
+def row(run: RunRecord) -> str:
+    """One run: means over routes and seeds, with the 95 % t-interval of the means by seed."""
+    driven_km = math.fsum(record.done_m for record in run.routes) / 1000.0
+    rules = rules_named(run.rules)
+    scored = rules.factors.keys() | rules.proportional
+    count = sum(event.kind in scored for record in run.routes for event in record.events)
+    completion = mean_interval(seed_means(run.routes, "route_completion", run.seeds))
+    penalty = mean_interval(seed_means(run.routes, "infraction_score", run.seeds))
+    bound = mean_bound(run.routes)
+    cells = [
+        f"`{run.agent}`",
+        run.track,
+        f"`{run.suite}`" + ("" if run.complete else " (not complete)"),
+        str(driving_interval(run)),
+        str(completion),
+        f"{penalty.mean:.2f}",
+        "-" if bound is None else f"{bound:.1f}",
+        f"{count / driven_km:.2f}" if driven_km > 0.0 else "-",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Reads the runs, sorts them by suite and score, prints the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folders", nargs="+", type=Path, help="folders of finished runs")
+    try:
+        runs = [read_run(folder) for folder in parser.parse_args().folders]
+    except ResultsError as error:
+        parser.error(str(error))
+    runs.sort(key=lambda run: (run.suite, -driving_interval(run).mean))
+    print(*HEADER, *map(row, runs), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

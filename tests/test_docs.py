@@ -1,0 +1,133 @@
+"""The documentation says what is so: its commands parse, its snippets run, its tables agree."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+import tyro
+
+import di_envs
+from agents import AGENTS
+from agents.base import Requirements
+from di_envs.observation import observation_space
+from di_envs.reward import PENALTIES, Standing, reward_terms
+from di_envs.suites import suite_names
+from di_envs.world.state import EventKind
+from leaderboard.cli import Command, Evaluate
+
+TOP = Path(__file__).resolve().parent.parent
+PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
+README = (TOP / "README.md").read_text(encoding="utf-8")
+CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
+
+
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def shell_commands(program):
+    """The command lines of the README that run a program, without their comments."""
+    for block in blocks(README, "sh"):
+        for line in block.splitlines():
+            for part in line.split("&&"):
+                words = shlex.split(part, comments=True)
+                if words and words[0].rpartition("/")[2] == program:
+                    yield words[1:]
+
+
+def rows(text, columns):
+    """Rows of tables of so many columns whose first cell names something in backticks."""
+    found = {}
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip("| "))]
+        if len(cells) == columns and cells[0].startswith("`"):
+            for name in re.findall(r"`([^`]+)`", cells[0]):
+                found[name] = cells[1:]
+    return found
+
+
+@pytest.mark.parametrize("number", range(len(blocks(README, "python"))))
+def test_the_readmes_python_runs(number):
+    code = blocks(README, "python")[number]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_readmes_agent_is_one():
+    code = next(block for block in blocks(README, "python") if "class Creep" in block)
+    names = {}
+    exec(code, names)  # our own text, just above
+    agent = names["Creep"]()
+    assert isinstance(agent.requires, Requirements)
+    env = di_envs.RouteEnv(suite="toy", observations=agent.requires.observations)
+    observation, _ = env.reset(seed=0)
+    memory = agent.start(env.plan, 0)
+    for _ in range(60):
+        control, memory = agent.act(observation, memory)
+        observation, *_ = env.step(control)
+    assert 1.0 < observation["speed"][0] < 4.0
+
+
+def test_the_readmes_commands_parse_and_name_what_there_is():
+    commands = [tyro.cli(Command, args=words) for words in shell_commands("driveinsight")]
+    assert len(commands) >= 5
+    for command in commands:
+        if isinstance(command, Evaluate):
+            name = command.agent.rpartition(":")[0]
+            assert command.agent in AGENTS or (TOP / name).is_file(), command.agent
+            assert command.suite in suite_names() or (command.town and command.routes)
+
+
+def test_the_test_command_follows_its_marker_on_one_line():
+    after = README.partition("<!-- test-command -->")[2]
+    command = next(line for line in after.splitlines() if line.startswith("python3 "))
+    assert command.split(" && ")[0] == "python3 -m venv .venv"
+    assert command.endswith(".venv/bin/python -m pytest")
+    assert (TOP / "constraints.txt").is_file()
+
+
+def test_the_readme_names_every_environment_and_no_other():
+    assert set(re.findall(r"DriveInsight-\w+-v\d+", README)) == set(di_envs.ENVIRONMENTS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(TOP)) for page in PAGES])
+def test_links_and_modules_that_a_page_names_are_there(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (page.parent / target).exists(), target
+    for name in re.findall(r"`((?:di_envs|agents|leaderboard|tests|examples|docs)/[\w/.]+)`", text):
+        assert (TOP / name).exists(), name
+
+
+def test_the_table_of_observations_is_the_space():
+    told = rows(CONVENTIONS, 4)
+    for name, space in observation_space(("prompt", "inertial")).items():
+        shape, kind, text = told[name]
+        assert shape == str(space.shape), name
+        assert kind == str(np.dtype(space.dtype)), name
+        if isinstance(space, gymnasium.spaces.Box):
+            for limit in np.unique(space.high):
+                shown = {np.float32(np.pi): "π", np.float32(2 * np.pi): "2π", 1e4: "10 000"}
+                assert shown.get(limit, f"{limit:g}") in text, (name, limit)
+
+
+def test_the_tables_of_events_and_rewards_are_the_rules():
+    told = rows(CONVENTIONS, 3)
+    assert {kind.name.lower() for kind in EventKind} <= told.keys()
+    for kind, factor in PENALTIES["carla-1.0"].items():
+        assert told[kind.name.lower()][-1] == f"score x {factor:.2f}"
+    still = Standing(0.0, 0.0, (0,) * 12)
+    assert reward_terms(still, still, PENALTIES["carla-1.0"]).keys() <= rows(CONVENTIONS, 2).keys()
