@@ -269,7 +269,7 @@ def town_picture(env: RouteEnv) -> plt.Figure:
     draw_signals(near, view, line_width=6.0)
     draw_route(near, view, line_width=6.0, targets=True)
     draw_actors(near, view, scale=1.0, ego_scale=1.0, walker_size=7.0)
-    figure.legend(handles=legend(), loc="lower center", ncols=9, frameon=False, fontsize=10.5)
+    figure.legend(handles=legend(), loc="lower center", ncols=10, frameon=False, fontsize=10.5)
     figure.subplots_adjust(left=0.01, right=0.99, top=0.955, bottom=0.06)
     return figure
 
@@ -295,7 +295,8 @@ def legend() -> list[Any]:
         square(ACTOR[ActorKind.BICYCLE], "bicycle"),
         square(ACTOR[ActorKind.MOTORCYCLE], "motorcycle"),
         Line2D([], [], linestyle="", marker="o", color=ACTOR[ActorKind.WALKER], label="walker"),
-        Line2D([], [], color=LIGHT[LightState.RED], linewidth=4, label="stop line of a light"),
+        Line2D([], [], color=LIGHT[LightState.RED], linewidth=4, label="light"),
+        square("#ffffff", "stop sign"),
     ]
 
 
