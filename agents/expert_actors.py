@@ -25,6 +25,7 @@ AHEAD_OF_WALKER_S = 1.2  # by which the car is gone before a walker steps onto i
 SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
 WALKER_LOOK_S = 6.0
 BLOCKED_GAP_M = 1.5
+PULL_OUT_M = 4.5  # behind a leader, that a change to the next lane takes from standstill
 PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
 FAR_M = 1e6
 
@@ -91,6 +92,10 @@ def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, sh
     if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
         return
     gap = rear - progress.station_m - half
+    if shift != 0.0 and along < speed + 1.0:  # it must pull out behind this one
+        if gap < PULL_OUT_M:
+            number[FRONT_OK] = 0.0
+        gap -= PULL_OUT_M - numbers.standstill_gap_m
     if abs(turn) > CROSSING_RAD and abs(across) > 1.0:
         leaving = (reach - math.copysign(offset, across * offset)) / abs(across)
         if gap > (leaving + SPARE_S) * speed + BLOCKED_GAP_M:

@@ -25,6 +25,7 @@ STEP_M = 0.5  # between path points
 BEYOND_M = 80.0  # the path goes on behind the route's end, so that nobody brakes for the end
 BACK_STEP_M = 12.0  # a lane left again within this length, for the one before, is a step back
 SHORT_LANE_M = 3.0  # lanes so short that points at 1 m may miss them
+WANTED_ROOM_M = 35.0  # for a lane change; late ones are begun earlier than the route says
 CHANGE_ROOM_M = 12.0  # shortest lane change
 BEHIND_START_M = 5.0  # a stop line this far behind the start is still below the tail
 CHANGE_END_M = 2.0  # lane changes end this far before the room for them does
@@ -77,6 +78,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
     """
     lanes = town.lanes
     legs = join_legs(legs_of(plan), lanes)
+    _make_room(legs, lanes)
     final = legs[-1].end_m - float(plan.lane_m[-1])
     runs, changes_at = _runs(legs, lanes)
     line, leg_rows, jumps = _lay_out(runs, changes_at, lanes)
@@ -153,6 +155,23 @@ def join_legs(legs: list[Leg], lanes: Lanes) -> list[Leg]:
             leg.end_m = float(lanes.length_m[leg.lane])
             following.begin_m = 0.0
     return joined
+
+
+def _make_room(legs: list[Leg], lanes: Lanes) -> None:
+    """Moves lane changes that come late to an earlier place on the same lane."""
+    for i, (leg, following) in enumerate(pairwise(legs)):
+        if following.lane not in (lanes.left[leg.lane], lanes.right[leg.lane]):
+            continue
+        room, changes = 0.0, 0
+        for before, after in pairwise(legs[i:]):
+            if lanes.junction[after.lane] >= 0:
+                break
+            room += after.end_m - after.begin_m
+            changes += after.lane not in _successors(lanes, before.lane)
+        back = min(changes * WANTED_ROOM_M - room, leg.end_m - leg.begin_m - 1.0)
+        if back > 0.0:
+            leg.end_m -= back
+            following.begin_m = max(following.begin_m - back, 0.0)
 
 
 def _skipped(lanes: Lanes, lane: int, target: int) -> list[int]:

@@ -49,9 +49,11 @@ def light_acceleration(
     """
     left = seconds_to_red(lights, signal)
     distance = line_m - station_m - half_length
-    if distance < -PAST_LINE_M:
-        return _between_line_and_tail(line_m - station_m, half_length, speed, left)
     over = line_m + TAIL_M + half_length  # where the centre is once the tail is over
+    if distance < -PAST_LINE_M:
+        if time_to(times, over - station_m) + numbers.red_margin_s <= left:
+            return NO_LIMIT_MPS2
+        return _between_line_and_tail(line_m - station_m, half_length, speed)
     room = queue[0] - numbers.standstill_gap_m - over - half_length
     clear = time_to(times, over - station_m)
     if room < 0.0:
@@ -67,10 +69,10 @@ def light_acceleration(
 
 
 @kernel
-def _between_line_and_tail(line_ahead_m, half_length, speed, left_s):
+def _between_line_and_tail(line_ahead_m, half_length, speed):
     """Over the line with the front but not with the tail, a slow car waits for green there."""
     room = line_ahead_m + TAIL_FROM * half_length - TAIL_MARGIN_M
-    if left_s > 0.0 or room < 0.0 or speed > CRAWLING_MPS:
+    if room < 0.0 or speed > CRAWLING_MPS:
         return NO_LIMIT_MPS2
     needed = braking_needed(room, speed)
     return NO_LIMIT_MPS2 if needed > HARD_MPS2 else -max(needed, HOLD_MPS2)
