@@ -332,7 +332,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
 def _can_stop(speed, distance):
     """Whether a vehicle can still stop before its line when the light turns yellow."""
     if speed < 1.0:
-        return distance > 0.1
+        return distance > 0.1 * speed
     return distance > speed * speed / (2.0 * YELLOW_BRAKING_MPS2) + 0.5
 
 

@@ -38,6 +38,7 @@ from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.dynamics import locate_ego
+from di_envs.world.lights import GREEN_TICKS
 from di_envs.world.occupancy import NO_LEADER_M
 from di_envs.world.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
 from di_envs.world.state import TICK_S, ActorKind, State
@@ -169,6 +170,18 @@ def test_at_yellow_one_stops_who_can_and_another_goes_on(before_m, stops):
     for _ in scene.run(8.0):
         pass
     assert (scene.to_end_m(0, WEST_TO_1) > 0.0) == stops
+
+
+def test_who_stands_a_hair_before_the_line_loses_the_grant_at_yellow():
+    """Somebody on the crosswalk may have kept it there while it was green."""
+    scene = Scene()
+    scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], 0.05)
+    scene.show("1", 0, ticks=GREEN_TICKS)
+    with scene.edit() as state:
+        state.grant[0] = scene.lane(NORTH_STRAIGHT)
+    for _ in scene.run(10.0):
+        pass
+    assert scene.to_end_m(0, WEST_TO_1) == pytest.approx(0.05)
 
 
 def test_a_car_stops_at_the_stop_sign_and_then_goes():
