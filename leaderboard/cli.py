@@ -6,7 +6,9 @@ after the arguments are known to be right.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -142,7 +144,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         args=arguments,
     )
     try:
-        return _run(command)
+        with _plain_warnings():
+            return _run(command)
     except KeyboardInterrupt:
         _complain("interrupted before a route was finished: nothing was kept")
         return EXIT_INTERRUPTED
@@ -163,9 +166,24 @@ def _run(command: Command) -> int:
             return _list_suites()
 
 
-def _complain(message: str) -> None:
+def _complain(message: str, kind: str = "[red]error[/red]") -> None:
     line = " ".join(message.split())
-    Console(stderr=True, soft_wrap=True, highlight=False).print(f"[red]error[/red]: {escape(line)}")
+    Console(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Shows each warning once, as a line for people: not where in our code it came from."""
+    told: set[str] = set()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            _complain(str(message), "[yellow]warning[/yellow]")
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 def _evaluate(command: Evaluate) -> int:

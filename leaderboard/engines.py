@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
+import warnings
 from collections import deque
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -130,6 +131,7 @@ def _stop(worker: _Worker) -> None:
 def _serve(connection: Connection, spec: RunSpec) -> None:
     """A worker's life: build the environment, drive what it is handed until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore", UserWarning)  # the parent has shown them as it warmed up
     from leaderboard.driver import Driver
 
     with Driver(spec) as driver, contextlib.suppress(EOFError, OSError):  # the parent is done

@@ -141,3 +141,13 @@ def test_the_command_line_loads_nothing_slow_until_it_must():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_warning_is_one_line_shown_once(capsys, tmp_path, shared):
+    town = shared / "data" / "xodr" / "Town05.xodr"
+    routes = shared / "data" / "routes" / "routes_town05_short.xml"
+    arguments = f"evaluate --agent constant --town {town} --routes {routes} --route-ids 4"
+    main([*arguments.split(), "--traffic", "0", "--output", str(tmp_path / "out")])
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.count("warning: Town05.xodr carries no traffic signals") == 1
+    assert "UserWarning" not in told
