@@ -143,6 +143,7 @@ def test_the_command_line_loads_nothing_slow_until_it_must():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.filterwarnings("always::UserWarning")
 def test_a_warning_is_one_line_shown_once(capsys, tmp_path, shared):
     town = shared / "data" / "xodr" / "Town05.xodr"
     routes = shared / "data" / "routes" / "routes_town05_short.xml"
