@@ -18,10 +18,13 @@ from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LightState, SignalKind, Turn
 from di_envs.town.queries import project_to_lane
+from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S, ActorKind
 
 REQUEST_BRAKING_MPS2 = 2.0  # a grant is asked for while one could still brake this gently
-YELLOW_BRAKING_MPS2 = 4.0  # harder than this nobody brakes for a yellow light
+YELLOW_BRAKING_MPS2 = 4.0  # harder than this nobody brakes for a yellow light …
+RED_BRAKING_MPS2 = 5.5  # … unless it would be red by the time that they come to the line
+SLOWING_MPS2 = 2.0  # with which they may slow down on the way to it, for a bend
 STOP_ZONE_M = 4.0  # a stop counts with the front this close to the line
 PATIENCE_TICKS = round(30.0 / TICK_S)  # after which a vehicle at a sign is let in by the others
 EGO_TURN_TICKS = round(6.0 / TICK_S)  # for which others let an ego that came first go first
@@ -29,7 +32,7 @@ EXIT_MARGIN_M = 3.0
 MOVING_MPS = 0.5
 
 _ABSENT = int(ActorKind.ABSENT)
-_GREEN = int(LightState.GREEN)
+_GREEN, _YELLOW = int(LightState.GREEN), int(LightState.YELLOW)
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 _LEFT = int(Turn.LEFT)
 
@@ -313,7 +316,8 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         approach = state.path[actor, requests.way_step[actor] - 1]
         _note_stop(state, lanes, signals, actor, approach, distance, tick)
         if must_stop(state, lanes, signals, actor, approach, distance):
-            if state.grant[actor] == way and _can_stop(speed, distance):
+            left_s = _yellow_left_s(state, lanes, signals, approach)
+            if state.grant[actor] == way and _can_stop(speed, distance, left_s):
                 state.grant[actor] = -1
             continue
         # who has just given up a grant asks from the next tick on: it is still in a holders' list
@@ -329,11 +333,23 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
 
 
 @kernel
-def _can_stop(speed, distance):
-    """Whether a vehicle can still stop before its line when the light turns yellow."""
+def _yellow_left_s(state, lanes, signals, approach):
+    """Seconds until the light at the end of an approach lane is red; 0 once it is, and at signs."""
+    signal = signals.stop_signal[lanes.stop_line[approach]]
+    if state.light[signal] != _YELLOW:
+        return 0.0
+    ticks = state.phase_ticks[signals.junction[signal]]
+    return (GREEN_TICKS + YELLOW_TICKS - ticks) * TICK_S
+
+
+@kernel
+def _can_stop(speed, distance, yellow_left_s):
+    """Whether a vehicle can still stop before its line, hard if it would come there at red."""
     if speed < 1.0:
         return distance > 0.1 * speed
-    return distance > speed * speed / (2.0 * YELLOW_BRAKING_MPS2) + 0.5
+    reach = (speed - 0.5 * SLOWING_MPS2 * yellow_left_s) * yellow_left_s
+    braking = YELLOW_BRAKING_MPS2 if distance < reach else RED_BRAKING_MPS2
+    return distance > speed * speed / (2.0 * braking) + 0.5
 
 
 @kernel

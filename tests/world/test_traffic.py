@@ -40,6 +40,7 @@ from di_envs.town.town import Town
 from di_envs.world.dynamics import locate_ego
 from di_envs.world.lights import GREEN_TICKS
 from di_envs.world.occupancy import NO_LEADER_M
+from di_envs.world.right_of_way import _can_stop
 from di_envs.world.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
 from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.traffic import (
@@ -170,6 +171,19 @@ def test_at_yellow_one_stops_who_can_and_another_goes_on(before_m, stops):
     for _ in scene.run(8.0):
         pass
     assert (scene.to_end_m(0, WEST_TO_1) > 0.0) == stops
+
+
+@given(speed=st.floats(1.0, 28.0), distance=st.floats(0.0, 150.0))
+def test_who_goes_on_at_yellow_is_across_before_red_and_who_stops_can(speed, distance):
+    """Up to 100 km/h there is no dilemma, even for who slows down for a bend behind the line."""
+    if _can_stop(speed, distance, 3.0):
+        assert speed**2 / (2.0 * MAX_BRAKING_MPS2) < distance
+        return
+    gone = 0.0
+    for _ in range(60):  # ticks of yellow
+        gone += speed * TICK_S
+        speed = max(speed - 2.0 * TICK_S, 1.0)
+    assert gone > distance
 
 
 def test_who_stands_a_hair_before_the_line_loses_the_grant_at_yellow():
