@@ -9,23 +9,17 @@ from __future__ import annotations
 
 from di_envs.kernels import kernel
 from di_envs.town.queries import project_to_lane
-from di_envs.world.occupancy import (
-    NO_LEADER_M,
-    body_ahead,
-    body_behind,
-    find_leader,
-    insert_body,
-)
-from di_envs.world.state import TICK_S, ActorKind
-from di_envs.world.traffic import (
+from di_envs.world.car_following import (
     ACCELERATION_MPS2,
     MAX_BRAKING_MPS2,
-    SAFE_GAP_M,
-    allowed_speed,
-    choose_path,
+    NO_LEADER_M,
     idm_acceleration,
     safe_speed,
 )
+from di_envs.world.occupancy import body_ahead, body_behind, find_leader, insert_body
+from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.traffic import SAFE_GAP_M, allowed_speed
+from di_envs.world.vehicle_motion import choose_path
 
 MIN_GAIN_MPS2 = 0.2
 MAX_BRAKING_IMPOSED_MPS2 = 2.0

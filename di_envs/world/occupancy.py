@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from di_envs.bundles import by_reference
 from di_envs.kernels import kernel
 from di_envs.town.queries import project_to_lane
+from di_envs.world.car_following import NO_LEADER_M
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind
-
-NO_LEADER_M = 1e9
 
 _ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 

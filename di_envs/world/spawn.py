@@ -11,8 +11,8 @@ from di_envs.keyed_random import Stream, keyed_hash, uniform
 from di_envs.town.lanes import Lanes
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import ActorKind, State
-from di_envs.world.traffic import choose_path, place_vehicle
 from di_envs.world.traffic_tables import TrafficTables
+from di_envs.world.vehicle_motion import choose_path, place_vehicle
 
 SPOT_SPACING_M = 12.0  # more than the longest vehicle with a gap
 END_MARGIN_M = 8.0  # free at both ends of a lane

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from di_envs.kernels import bind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.approach import make_requests
 from di_envs.world.dynamics import EgoModel, locate_ego
 from di_envs.world.event_rows import COLUMNS, ROWS_PER_EGO
 from di_envs.world.events import begin_events
 from di_envs.world.lights import start_lights
 from di_envs.world.occupancy import make_occupancy
 from di_envs.world.poles import place_poles
-from di_envs.world.right_of_way import make_requests
 from di_envs.world.spawn import spawn_traffic
 from di_envs.world.state import (
     ActorKind,

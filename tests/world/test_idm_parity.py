@@ -11,21 +11,22 @@ from hypothesis import strategies as st
 from small_world import LaneSpec, make_lanes, make_town
 
 from di_envs.town.town import Town
-from di_envs.world.lane_change import MAX_BRAKING_IMPOSED_MPS2, MIN_GAIN_MPS2, _mobil
-from di_envs.world.occupancy import NO_LEADER_M, fill_occupancy, make_occupancy
-from di_envs.world.state import ActorKind, Capacity, state_dtype, views_of
-from di_envs.world.traffic import (
+from di_envs.world.car_following import (
     ACCELERATION_MPS2,
     CAR_LENGTH_M,
     COMFORT_BRAKING_MPS2,
     DISTANCE_WANTED_M,
     MAX_BRAKING_MPS2,
+    NO_LEADER_M,
     TIME_WANTED_S,
-    allowed_speed,
     idm_acceleration,
-    place_vehicle,
 )
+from di_envs.world.lane_change import MAX_BRAKING_IMPOSED_MPS2, MIN_GAIN_MPS2, _mobil
+from di_envs.world.occupancy import fill_occupancy, make_occupancy
+from di_envs.world.state import ActorKind, Capacity, state_dtype, views_of
+from di_envs.world.traffic import allowed_speed
 from di_envs.world.traffic_tables import traffic_tables
+from di_envs.world.vehicle_motion import place_vehicle
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # of its dependencies

@@ -37,19 +37,19 @@ from di_envs.town.lanes import LightState, SignalKind
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
-from di_envs.world.dynamics import locate_ego
-from di_envs.world.lights import GREEN_TICKS
-from di_envs.world.occupancy import NO_LEADER_M
-from di_envs.world.right_of_way import _can_stop
-from di_envs.world.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
-from di_envs.world.state import TICK_S, ActorKind, State
-from di_envs.world.traffic import (
+from di_envs.world.approach import can_stop
+from di_envs.world.car_following import (
     ACCELERATION_MPS2,
-    LINE_GAP_M,
     MAX_BRAKING_MPS2,
+    NO_LEADER_M,
     idm_acceleration,
     safe_speed,
 )
+from di_envs.world.dynamics import locate_ego
+from di_envs.world.lights import GREEN_TICKS
+from di_envs.world.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
+from di_envs.world.state import TICK_S, ActorKind, State
+from di_envs.world.traffic import LINE_GAP_M
 from di_envs.world.world import World, WorldConfig
 
 TOY = load_suite("toy")
@@ -176,7 +176,7 @@ def test_at_yellow_one_stops_who_can_and_another_goes_on(before_m, stops):
 @given(speed=st.floats(1.0, 28.0), distance=st.floats(0.0, 150.0))
 def test_who_goes_on_at_yellow_is_across_before_red_and_who_stops_can(speed, distance):
     """Up to 100 km/h there is no dilemma, even for who slows down for a bend behind the line."""
-    if _can_stop(speed, distance, 3.0):
+    if can_stop(speed, distance, 3.0):
         assert speed**2 / (2.0 * MAX_BRAKING_MPS2) < distance
         return
     gone = 0.0

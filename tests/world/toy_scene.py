@@ -13,7 +13,7 @@ import numpy as np
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State, views_of
-from di_envs.world.traffic import place_vehicle
+from di_envs.world.vehicle_motion import place_vehicle
 from di_envs.world.world import World, WorldConfig
 
 # The western street, driven north and east to junction 1 (lights): left and right lane
