@@ -70,7 +70,7 @@ def find_approach(requests, state, lanes, actor, look_m):
 
 
 @kernel
-def must_stop(state, lanes, signals, actor, approach, distance_m):
+def must_stop(state, lanes, signals, actor, approach):
     """Whether the signal at the end of an approach lane keeps a vehicle from asking to enter."""
     line = lanes.stop_line[approach]
     if line < 0:

@@ -53,7 +53,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         distance = requests.distance_m[actor]
         approach = state.path[actor, requests.way_step[actor] - 1]
         note_stop(state, lanes, signals, actor, approach, distance, tick)
-        if must_stop(state, lanes, signals, actor, approach, distance):
+        if must_stop(state, lanes, signals, actor, approach):
             left_s = yellow_left_s(state, lanes, signals, approach)
             if state.grant[actor] == way and can_stop(speed, distance, left_s):
                 state.grant[actor] = -1
