@@ -35,6 +35,8 @@ class Occupancy(NamedTuple):
     size: NDArray[np.int32]  # (1,) bodies in use
     holder: NDArray[np.int32]  # (L,) first vehicle that holds the grant for a junction lane, or -1
     next_holder: NDArray[np.int32]  # (A,)
+    leaver: NDArray[np.int32]  # (L,) first vehicle that is leaving a junction lane, or -1
+    next_leaver: NDArray[np.int32]  # (A,)
 
 
 def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
@@ -50,6 +52,8 @@ def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
         size=np.zeros(1, np.int32),
         holder=np.full(lanes, -1, np.int32),
         next_holder=np.full(actors, -1, np.int32),
+        leaver=np.full(lanes, -1, np.int32),
+        next_leaver=np.full(actors, -1, np.int32),
     )
 
 
@@ -79,6 +83,7 @@ def fill_occupancy(occupancy, state, lanes, egos, vehicle_end):
     """Rebuilds all lists from the state: egos [0, egos), vehicles [egos, vehicle_end)."""
     occupancy.first[:] = -1
     occupancy.holder[:] = -1
+    occupancy.leaver[:] = -1
     occupancy.size[0] = 0
     for ego in range(egos):
         _insert_free_body(occupancy, state, lanes, ego)
@@ -89,6 +94,10 @@ def fill_occupancy(occupancy, state, lanes, egos, vehicle_end):
             if grant >= 0:
                 occupancy.next_holder[actor] = occupancy.holder[grant]
                 occupancy.holder[grant] = actor
+            leaving = state.leaving[actor]
+            if leaving >= 0:
+                occupancy.next_leaver[actor] = occupancy.leaver[leaving]
+                occupancy.leaver[leaving] = actor
 
 
 @kernel

@@ -24,6 +24,7 @@ from di_envs.world.state import PATH_LANES, ActorKind
 from di_envs.world.yielding import crosses_holder, ego_in_the_way, exit_has_room, ways_conflict
 
 REQUEST_BRAKING_MPS2 = 2.0  # a grant is asked for while one could still brake this gently
+STANDING_ROOM_M = 2.0  # between two junctions, beyond a vehicle's length, for it to wait there
 
 _ABSENT = int(ActorKind.ABSENT)
 
@@ -41,6 +42,7 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
     for actor in range(egos, vehicle_end):
         if state.kind[actor] == _ABSENT:
             continue
+        _make_way_for_next(state, lanes, actor)
         held = state.grant[actor]
         _release_grant(state, lanes, actor)
         speed = state.speed[actor]
@@ -75,6 +77,26 @@ def _waits_behind(state, ahead, actor, distance):
     """Whether somebody without a grant stands between a vehicle and its stop line."""
     leader = ahead.actor[actor]
     return leader >= 0 and ahead.gap_m[actor] < distance and state.grant[leader] < 0
+
+
+@kernel
+def _make_way_for_next(state, lanes, actor):
+    """On its way through a junction that the next one follows closely, a vehicle asks for that too.
+
+    It cannot wait until its rear has left the first: there is no room for it in between.
+    """
+    grant = state.grant[actor]
+    link, beyond = state.path[actor, 1], state.path[actor, 2]
+    if grant < 0 or state.lane[actor] != grant or link < 0 or beyond < 0:
+        return
+    if lanes.junction[link] >= 0 or lanes.junction[beyond] < 0 or state.leaving[actor] >= 0:
+        return
+    if lanes.length_m[link] < 2.0 * state.half_length[actor] + STANDING_ROOM_M:
+        state.leaving[actor] = grant
+        state.leaving_m[actor] = state.lane_m[actor] - lanes.length_m[grant]
+        state.grant[actor] = -1
+        state.stopped_at[actor] = -1
+        state.arrival_tick[actor] = -1
 
 
 @kernel

@@ -54,6 +54,8 @@ class State(NamedTuple):
     changing_from: NDArray[np.int32]  # lane that a lane change leaves, -1 when none is under way
     change_start_tick: NDArray[np.int64]
     grant: NDArray[np.int32]  # junction lane that the vehicle may enter or is on, -1 for none
+    leaving: NDArray[np.int32]  # junction lane whose grant made way for the next one's, -1 for none
+    leaving_m: NDArray[np.float64]  # how far the centre is beyond the end of that lane
     arrival_tick: NDArray[np.int64]  # when it came to the stop line it waits at, -1 for none
     stopped_at: NDArray[np.int32]  # stop line at which it has stopped for the sign, -1 for none
     still_ticks: NDArray[np.int32]  # ticks for which it has stood still
@@ -135,7 +137,8 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         "path": (_I4, (*actors, PATH_LANES)),
         **dict.fromkeys(("previous_lane", "changing_from"), (_I4, actors)),
         "change_start_tick": (_I8, actors),
-        "grant": (_I4, actors),
+        **dict.fromkeys(("grant", "leaving"), (_I4, actors)),
+        "leaving_m": (_F8, actors),
         "arrival_tick": (_I8, actors),
         **dict.fromkeys(("stopped_at", "still_ticks"), (_I4, actors)),
         "desired_factor": (_F8, actors),

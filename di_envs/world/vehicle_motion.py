@@ -77,6 +77,10 @@ def move_vehicle(state, lanes, tables, actor, acceleration, cap):
     state.acceleration[actor] = (moved - speed) / TICK_S
     state.speed[actor] = moved
     state.lane_m[actor] += moved * TICK_S
+    if state.leaving[actor] >= 0:
+        state.leaving_m[actor] += moved * TICK_S
+        if state.leaving_m[actor] >= state.half_length[actor]:
+            state.leaving[actor] = -1
     state.still_ticks[actor] = state.still_ticks[actor] + 1 if moved < STILL_MPS else 0
     _enter_next_lane(state, lanes, tables, actor)
     _drift_to_centre(state, actor, moved)

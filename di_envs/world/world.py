@@ -122,7 +122,15 @@ class World:
         self._allocate(tuple(plans))
         state = self._state
         state.seed[...] = seed
-        for name in ("lane", "path", "previous_lane", "changing_from", "grant", "stopped_at"):
+        for name in (
+            "lane",
+            "path",
+            "previous_lane",
+            "changing_from",
+            "grant",
+            "leaving",
+            "stopped_at",
+        ):
             getattr(state, name)[...] = -1
         for name in ("arrival_tick", "walk_edge", "occupied"):
             getattr(state, name)[...] = -1

@@ -42,6 +42,20 @@ def crosses_holder(occupancy, state, lanes, way, actor):
             ):
                 return True
             holder = occupancy.next_holder[holder]
+        if _crosses_leaver(occupancy, state, lanes, other, lanes.conflict_other_end_m[k], actor):
+            return True
+    return False
+
+
+@kernel
+def _crosses_leaver(occupancy, state, lanes, other, end_m, actor):
+    """Whether the tail of a vehicle that goes on to a near junction is still before station end."""
+    leaver = occupancy.leaver[other]
+    while leaver >= 0:
+        rear = lanes.length_m[other] + state.leaving_m[leaver] - state.half_length[leaver]
+        if leaver != actor and rear < end_m:
+            return True
+        leaver = occupancy.next_leaver[leaver]
     return False
 
 

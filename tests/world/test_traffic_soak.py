@@ -131,3 +131,14 @@ def test_traffic_in_the_shipped_town_keeps_the_law_and_keeps_moving(seed: int) -
 @pytest.mark.filterwarnings("ignore:.*:UserWarning")
 def test_traffic_in_the_real_town05_keeps_the_law_and_keeps_moving(shared: Path) -> None:
     check(load_town(shared / "data" / "xodr" / "Town05.xodr", signals="town05"), 0)
+
+
+def test_traffic_gets_through_junctions_that_follow_each_other_at_once(shared: Path) -> None:
+    # roads of 0.4 to 6 m join junctions there: cars on them once waited for each other for ever
+    world = World(load_town(shared / "data" / "xodr" / "Town04_2020.xodr"), WorldConfig())
+    world.reset(0, ())
+    longest = 0
+    for _ in range(600):
+        world.advance(np.zeros((0, 3)), 20)
+        longest = max(longest, int(world.view.state.still_ticks[:VEHICLES].max()))
+    assert longest * TICK_S <= 180.0
