@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -194,6 +195,20 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._begun, self._over = snapshot.world is not None, snapshot.over
         self.np_random.bit_generator.state = dict(snapshot.np_random)
         self._np_random_seed = snapshot.np_random_seed
+
+    def twin(self) -> Self:
+        """Another environment like this one, not begun; it shares the town, routes and tables.
+
+        What is shared never changes, so twins may be stepped in threads of their own.
+        """
+        twin = copy.copy(self)
+        twin.world = self.world.twin()
+        twin.observation_space = copy.deepcopy(self.observation_space)
+        twin.action_space = copy.deepcopy(self.action_space)
+        twin._observer = copy.copy(self._observer)  # its buffers are made by start()
+        twin._begun, twin._over = False, True
+        twin._np_random, twin._np_random_seed = None, None
+        return twin
 
     def _route_index(self, options: dict[str, Any], world_seed: int) -> int:
         for option in options:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -97,6 +98,12 @@ class World:
         self._walk = build_walk_graph(town)
         self._ego_model = EgoModel().parameters()
         self._view: WorldView | None = None
+
+    def twin(self) -> World:
+        """Another world in the same town, without an episode; it shares the town's tables."""
+        twin = copy.copy(self)
+        twin._view = None
+        return twin
 
     @property
     def view(self) -> WorldView:
