@@ -31,6 +31,9 @@ class Stream(IntEnum):
     AGENT = 10
     WEATHER = 11
     ROUTE = 12
+    VEHICLE_COLOUR = 13
+    SCENERY = 14  # of a town, the same in every episode
+    RAIN = 15
 
 
 @kernel
