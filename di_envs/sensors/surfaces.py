@@ -344,9 +344,7 @@ def _halve(fine, coarse):
         for column in range(coarse.shape[1]):
             r, g, b = 0.0, 0.0, 0.0
             for k in range(4):
-                texel = fine[
-                    min(2 * row + k // 2, rows - 1), min(2 * column + k % 2, columns - 1)
-                ]
+                texel = fine[min(2 * row + k // 2, rows - 1), min(2 * column + k % 2, columns - 1)]
                 r += np.float64(texel & np.uint32(255))
                 g += np.float64((texel >> np.uint32(8)) & np.uint32(255))
                 b += np.float64((texel >> np.uint32(16)) & np.uint32(255))
