@@ -6,6 +6,7 @@ ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to 
 
 from __future__ import annotations
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,6 +132,12 @@ class Observer:
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
         self._geo_origin = np.array(town.geo_origin, np.float64)
+
+    def of_ego(self, ego: int) -> Observer:
+        """Another observer, of that ego: it shares the static tables, `start` makes its buffers."""
+        other = copy.copy(self)
+        other._ego = ego
+        return other
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""

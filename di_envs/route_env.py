@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -12,22 +11,13 @@ import gymnasium
 import numpy as np
 
 from di_envs.actions import action_space, checked_action
-from di_envs.config import RouteEnvConfig, check_name
+from di_envs.config import check_name
+from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
 from di_envs.observation import Observer, observation_space
-from di_envs.reward import (
-    PENALTIES,
-    Standing,
-    infraction_penalty,
-    reward_terms,
-    score_metres,
-    standing_of,
-)
-from di_envs.suites import choose_suite
-from di_envs.town.loading import load_town
+from di_envs.reward import standing_of
 from di_envs.town.plan import RoutePlan
-from di_envs.world.state import TICK_S, EventKind
-from di_envs.world.world import Event, Snapshot, World, WorldConfig, WorldView
+from di_envs.world.world import Snapshot, World, WorldView
 
 Observation = dict[str, Any]
 Info = dict[str, Any]
@@ -83,30 +73,19 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         """
         if render_mode is not None:
             raise ValueError(f"RouteEnv has no render mode yet; got render_mode={render_mode!r}.")
-        config = RouteEnvConfig.from_mapping(options)
-        suite = choose_suite(
-            config.suite, town=config.town, routes=config.routes, signals=config.signals
-        )
-        vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
-        walkers = suite.traffic.walkers if config.walkers is None else config.walkers
-        self.config = dataclasses.replace(
-            config, traffic=vehicles, walkers=walkers, weather=config.weather or suite.weather
-        )
-        town = load_town(suite.town_path, suite.signals)
-        self.plans = suite.plans(town, config.route_ids)
-        self.world = World(town, WorldConfig(vehicles=vehicles, walkers=walkers))
-        self.observation_space = observation_space(config.observations)
+        self._course = course = load_course(options)
+        self.config, self.plans = course.config, course.plans
+        self.world = World(course.town, course.world_config)
+        self.observation_space = observation_space(self.config.observations)
         self.action_space = action_space()
-        self._observer = Observer(town, config.observations, _EGO)
-        self._penalties = PENALTIES[config.rules]
-        self._stops = tuple(EventKind[name.upper()] for name in config.terminate_on)
+        self._observer = Observer(course.town, self.config.observations, _EGO)
         self._begun = False
         self._over = True
 
     @property
     def route_ids(self) -> tuple[str, ...]:
         """Ids of the routes, by index."""
-        return tuple(plan.route_id for plan in self.plans)
+        return self._course.route_ids
 
     @property
     def view(self) -> WorldView:
@@ -142,7 +121,8 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._begun, self._over = True, False
         self._observer.start(self.view)
         standing = standing_of(self.view.state, _EGO)
-        return self._observer.observe(), self._info(standing, standing, ())
+        info = self._course.info(self.view, _EGO, standing, standing, ())
+        return self._observer.observe(), info
 
     def step(self, action: np.ndarray[Any, Any]) -> tuple[Observation, float, bool, bool, Info]:
         """Holds an action for `control_dt_s`.
@@ -159,13 +139,13 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             raise gymnasium.error.ResetNeeded(
                 "There is no episode to step: it is over, or none was begun. Call reset() first."
             )
-        state = self.view.state
-        before = standing_of(state, _EGO)
+        view, course = self.view, self._course
+        before = standing_of(view.state, _EGO)
         events = tuple(self.world.advance(control[None], self.config.control_ticks))
-        after = standing_of(state, _EGO)
-        terminated, truncated = self._ending(before, after)
+        after = standing_of(view.state, _EGO)
+        terminated, truncated = course.ending(view, _EGO, before, after)
         self._over = terminated or truncated
-        info = self._info(before, after, events)
+        info = course.info(view, _EGO, before, after, events)
         reward = sum(info["reward_terms"].values())
         return self._observer.observe(), reward, terminated, truncated, info
 
@@ -205,7 +185,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         twin.world = self.world.twin()
         twin.observation_space = copy.deepcopy(self.observation_space)
         twin.action_space = copy.deepcopy(self.action_space)
-        twin._observer = copy.copy(self._observer)  # its buffers are made by start()
+        twin._observer = self._observer.of_ego(_EGO)
         twin._begun, twin._over = False, True
         twin._np_random, twin._np_random_seed = None, None
         return twin
@@ -213,38 +193,6 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     def _route_index(self, options: dict[str, Any], world_seed: int) -> int:
         for option in options:
             check_name(option, _RESET_OPTIONS, "reset option")
-        route, count = options.get("route"), len(self.plans)
-        if route is None:
-            return int(keyed_hash(world_seed, int(Stream.ROUTE), 0, 0)) % count
-        if isinstance(route, str):
-            check_name(route, self.route_ids, "route id")
-            return self.route_ids.index(route)
-        if isinstance(route, bool) or not isinstance(route, int | np.integer):
-            raise ValueError(f"options['route'] is an id (str) or an index (int); got {route!r}.")
-        if not 0 <= route < count:
-            raise ValueError(
-                f"Route index {route} is not in 0..{count - 1}; for the route whose id is {route} "
-                f"give the string '{route}'. Ids: {', '.join(self.route_ids)}."
-            )
-        return int(route)
-
-    def _ending(self, before: Standing, after: Standing) -> tuple[bool, bool]:
-        """Whether the episode is terminated, and whether it is truncated."""
-        finished = int(self.view.state.finished[_EGO])
-        stopped = any(after.counts[kind] > before.counts[kind] for kind in self._stops)
-        truncated = finished == EventKind.TIMEOUT
-        return stopped or (finished != 0 and not truncated), truncated
-
-    def _info(self, before: Standing, after: Standing, events: tuple[Event, ...]) -> Info:
-        state, plan = self.view.state, self.plan
-        finished = int(state.finished[_EGO])
-        return {
-            "route_id": plan.route_id,
-            "route_completion": 100.0 * after.done_m / plan.length_m,
-            "infraction_penalty": infraction_penalty(after, self._penalties),
-            "driving_score": 100.0 * score_metres(after, self._penalties) / plan.length_m,
-            "game_time_s": int(state.tick) * TICK_S,
-            "reward_terms": reward_terms(before, after, self._penalties),
-            "events": events,
-            "finished": EventKind(finished).name.lower() if finished else "",
-        }
+        if options.get("route") is None:
+            return int(keyed_hash(world_seed, int(Stream.ROUTE), 0, 0)) % len(self.plans)
+        return self._course.route_index(options["route"])

@@ -169,6 +169,14 @@ class World:
             ticks -= batch
         return events
 
+    def remove_ego(self, ego: int) -> None:
+        """Takes an ego off the road for the rest of the episode; what it has done still counts."""
+        state = self._state
+        state.kind[ego] = ActorKind.ABSENT
+        state.lane[ego] = -1
+        state.occupied[ego] = -1
+        state.speed[ego] = state.acceleration[ego] = state.yaw_rate[ego] = 0.0
+
     def save(self) -> Snapshot:
         """Copies the state whole."""
         view = self.view
