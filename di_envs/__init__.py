@@ -26,14 +26,21 @@ ENVIRONMENTS = {
 }
 
 # Loaded when first asked for, as they bring Numba with them.
-_LAZY = {"RouteEnv": "di_envs.route_env", "RouteVectorEnv": "di_envs.vector_env"}
+_LAZY = {
+    "MultiEgoEnv": "di_envs.multi_ego",
+    "RouteEnv": "di_envs.route_env",
+    "RouteVectorEnv": "di_envs.vector_env",
+    "parallel_env": "di_envs.multi_ego",
+}
 
 __all__ = [
     "ENVIRONMENTS",
     "EnvSnapshot",
+    "MultiEgoEnv",
     "RouteEnv",
     "RouteEnvConfig",
     "RouteVectorEnv",
+    "parallel_env",
     "restore",
     "save",
 ]
