@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.world.kinds import TICK_S, EventKind
 
-OBSERVATION_GROUPS = ("prompt", "inertial")  # what can be asked for now
-LATER_GROUPS = ("camera", "lidar")  # named in the design, not rendered yet
+OBSERVATION_GROUPS = ("prompt", "inertial", "camera")  # what can be asked for now
+LATER_GROUPS = ("lidar",)  # named in the design, not rendered yet
 EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
 RULES = ("carla-1.0",)
 
@@ -69,10 +70,12 @@ class RouteEnvConfig:
         routes: Path of a route file in CARLA's XML.
         route_ids: Ids of the routes to use; None for all.
         signals: Sidecar file or shipped name of a town's signals, or `synthesise`.
-        observations: Groups of observations: `prompt`, `inertial` (`camera`, `lidar` come later).
+        observations: Groups of observations: `prompt`, `inertial`, `camera` (`lidar` comes later).
         traffic: Number of other vehicles.
         walkers: Number of walkers.
         weather: Name of one of CARLA's weather presets; seen by cameras only.
+        cameras: Name of a rig, `small` (4 x 256 x 144), `paper` (4 x 1600 x 900) or `rl` (one of
+            84 x 84), or a `Rig` of one's own; for the group `camera`.
         control_dt_s: Time for which an action is held, a multiple of the world tick of 0.05 s.
         rules: Name of the scoring rules; their penalties make the reward.
         terminate_on: Events that end the episode besides those by which the rules do, such as
@@ -88,6 +91,7 @@ class RouteEnvConfig:
     traffic: int | None = None
     walkers: int | None = None
     weather: str | None = None
+    cameras: str | Rig = "small"
     control_dt_s: float = 0.1
     rules: str = "carla-1.0"
     terminate_on: tuple[str, ...] = ()
@@ -135,6 +139,7 @@ class RouteEnvConfig:
         if self.weather is not None:
             check_name(self.weather, WEATHERS, "weather")
         check_name(self.rules, RULES, "rules")
+        rig_of(self.cameras)
 
     @property
     def control_ticks(self) -> int:

@@ -84,10 +84,16 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         self.world = World(course.town, course.world_config)
         self.possible_agents = [f"ego_{ego}" for ego in range(egos)]
         self.agents: list[str] = []
-        space = observation_space(self.config.observations)
+        space = observation_space(self.config.observations, self.config.cameras)
         self._observation_spaces = {name: copy.deepcopy(space) for name in self.possible_agents}
         self._action_spaces = {name: action_space() for name in self.possible_agents}
-        first = Observer(course.town, self.config.observations, 0)
+        first = Observer(
+            course.town,
+            self.config.observations,
+            0,
+            cameras=self.config.cameras,
+            weather=self.config.weather,
+        )
         self._observers = [first.of_ego(ego) for ego in range(egos)]
         self._np_random, _ = seeding.np_random(None)
 

@@ -33,7 +33,11 @@ from di_envs.prompt import (
     prompt_route_of,
     stop_lines_of,
 )
+from di_envs.sensors.camera import FAR_M, CameraRig
+from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
+from di_envs.sensors.tags import Tag
+from di_envs.sensors.weather import weather_of
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
@@ -64,7 +68,7 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
 }
 
 
-def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
+def observation_space(groups: tuple[str, ...], cameras: str | Rig = "small") -> spaces.Dict:
     """The space of the groups asked for.
 
     Group `prompt`: `command` (RoadOption at the next target point, 0 for none), `target_point`
@@ -78,6 +82,9 @@ def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
 
     Group `inertial`: `imu` (ax, ay, az [m/s2], gx, gy, gz [rad/s], compass [rad]) and `gnss`
     (latitude, longitude [deg], altitude [m]; double precision, as a single one is 0.4 m coarse).
+
+    Group `camera`: for each camera of the rig `cameras` its RGB image (H, W, 3) under its name, and
+    what else the rig asks for (see `Rig`).
     """
     space: dict[str, spaces.Space[Any]] = {}
     if "prompt" in groups:
@@ -89,7 +96,24 @@ def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
         space["gnss"] = spaces.Box(
             np.array([-90.0, -180.0, -1e4]), np.array([90.0, 180.0, 1e4]), dtype=np.float64
         )
+    if "camera" in groups:
+        space.update(_image_spaces(rig_of(cameras)))
     return spaces.Dict(space)
+
+
+def _image_spaces(rig: Rig) -> dict[str, spaces.Space[Any]]:
+    images: dict[str, spaces.Space[Any]] = {}
+    for camera in rig.cameras:
+        size = (camera.height, camera.width)
+        images[camera.name] = spaces.Box(0, 255, (*size, 3), np.uint8)
+        if rig.depth:
+            images[f"{camera.name}_depth"] = spaces.Box(0.0, FAR_M, size, np.float32)
+        if rig.semantic:
+            images[f"{camera.name}_semantic"] = spaces.Box(0, max(Tag), size, np.uint8)
+        if rig.instance:
+            most = int(np.iinfo(np.int32).max)
+            images[f"{camera.name}_instance"] = spaces.Box(0, most, size, np.int32)
+    return images
 
 
 def _table(name: str) -> spaces.Box:
@@ -126,9 +150,28 @@ def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no
 class Observer:
     """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables."""
 
-    def __init__(self, town: Town, groups: tuple[str, ...], ego: int = 0) -> None:
+    def __init__(
+        self,
+        town: Town,
+        groups: tuple[str, ...],
+        ego: int = 0,
+        *,
+        cameras: str | Rig = "small",
+        weather: str | None = None,
+    ) -> None:
+        """Prepares to look.
+
+        Args:
+            town: The town.
+            groups: Groups of observations.
+            ego: Index of the ego that looks.
+            cameras: Its rig, or the name of a shipped one; for group `camera`.
+            weather: What cameras see, one of CARLA's presets; None for ClearNoon.
+        """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
-        self._ego = ego
+        self._rig = rig_of(cameras) if "camera" in groups else None
+        self._weather = weather_of(weather or "ClearNoon")
+        self._ego, self._town = ego, town
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
         self._geo_origin = np.array(town.geo_origin, np.float64)
@@ -154,6 +197,10 @@ class Observer:
         self._fill = bind(
             fill_observation, self._sight, self._ego, self._with_prompt, self._with_inertial
         )
+        self._cameras: CameraRig | None = None
+        if self._rig is not None:
+            self._cameras = CameraRig(self._town, self._rig, self._weather, self._ego)
+            self._cameras.start(view)
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
@@ -169,4 +216,6 @@ class Observer:
         if self._with_inertial:
             observation["imu"] = sight.imu.copy()
             observation["gnss"] = sight.gnss.copy()
+        if self._cameras is not None:
+            observation.update(self._cameras.observe())
         return observation

@@ -76,9 +76,15 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._course = course = load_course(options)
         self.config, self.plans = course.config, course.plans
         self.world = World(course.town, course.world_config)
-        self.observation_space = observation_space(self.config.observations)
+        self.observation_space = observation_space(self.config.observations, self.config.cameras)
         self.action_space = action_space()
-        self._observer = Observer(course.town, self.config.observations, _EGO)
+        self._observer = Observer(
+            course.town,
+            self.config.observations,
+            _EGO,
+            cameras=self.config.cameras,
+            weather=self.config.weather,
+        )
         self._begun = False
         self._over = True
 

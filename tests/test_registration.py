@@ -108,11 +108,12 @@ def test_an_unknown_option_is_refused_with_a_suggestion():
     [
         ({}, "needs suite=NAME, or both town=FILE and routes=FILE"),
         ({"town": "x.xodr"}, "needs suite=NAME"),
-        ({"suite": "toy", "observations": ("camera", "prompt")}, "'camera' is not available yet"),
+        ({"suite": "toy", "observations": ("lidar", "prompt")}, "'lidar' is not available yet"),
         ({"suite": "toy", "observations": ("promt",)}, "did you mean 'prompt'"),
         ({"suite": "toy", "observations": "prompt"}, r"Try \('prompt',\)"),
         ({"suite": "toy", "observations": ()}, "observations is empty"),
         ({"suite": "toy", "weather": "ClearNon"}, "did you mean 'ClearNoon'"),
+        ({"suite": "toy", "cameras": "papr"}, "did you mean 'paper'"),
         ({"suite": "toy", "rules": "carla-3.0"}, "known: carla-1.0"),
         ({"suite": "toy", "terminate_on": ("red_lights",)}, "did you mean 'red_light'"),
         ({"suite": "toy", "traffic": -1}, "traffic is a number of actors"),

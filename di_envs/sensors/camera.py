@@ -34,14 +34,17 @@ from di_envs.sensors.spans import (
     haze_span,
     headlights,
     hit_box,
+    last_bytes,
     light_ground,
-    line,
     mottle,
     multiply,
+    plane_points,
     puddles,
     sample,
     shade_span,
+    spread,
     store_row,
+    tags_of,
     windows,
 )
 from di_envs.sensors.surfaces import LEVELS, TEXEL_M
@@ -75,6 +78,7 @@ class Canvas(NamedTuple):
     blue: NDArray[np.float32]
     u: NDArray[np.float32]  # places in the raster
     v: NDArray[np.float32]
+    samples: NDArray[np.float32]  # (3, W + 2) before they are spread
     shadow: NDArray[np.float32]
     last: NDArray[np.uint8]
     code: NDArray[np.int32]
@@ -106,67 +110,67 @@ def render(studio, canvas, ego, number):
     place_camera(studio.state, ego, canvas.mount, canvas.cam)
     project_boxes(canvas.cam, studio.boxes, look, width, height, seen)
     project_shadows(canvas.cam, studio.boxes, look, scene.base_z[0], seen)
+    start, boxes = _rows_of_boxes(seen, height)
     for y in range(height):
-        _row(studio, canvas, y)
+        _row(studio, canvas, y, boxes[start[y] : start[y + 1]])
     add_glow(studio.boxes, seen, canvas.cam, canvas.depth, canvas.rgb)
     if look.numbers[4] > 0.0:
         add_rain(studio.state, number, look.numbers[4], canvas.rgb)
 
 
 @kernel
-def _row(studio, canvas, y):
-    """Takes one row of pixels."""
-    cam, seen, boxes, look = canvas.cam, studio.seen, studio.boxes, studio.look
+def _rows_of_boxes(seen, height):
+    """Which boxes each row has to test: row y those from start[y] to start[y + 1]."""
+    start = np.zeros(height + 1, np.int64)
+    for k in range(seen.count[0]):
+        for y in range(seen.rect[k, 2], seen.rect[k, 3]):
+            start[y + 1] += 1
+    for y in range(height):
+        start[y + 1] += start[y]
+    boxes = np.empty(start[height], np.int32)
+    filled = start.copy()
+    for k in range(seen.count[0]):
+        for y in range(seen.rect[k, 2], seen.rect[k, 3]):
+            boxes[filled[y]] = k
+            filled[y] += 1
+    return start, boxes
+
+
+@kernel
+def _row(studio, canvas, y, boxes):
+    """Takes one row of pixels, on which these boxes may be."""
+    cam, seen, look = canvas.cam, studio.seen, studio.look
     depth = canvas.depth[y]
-    width = depth.shape[0]
     v = (y + 0.5 - cam[14]) / cam[12]
     drop = cam[5] + v * cam[11]  # of the ray, upwards, for 1 ahead
     above = cam[2] - studio.scene.base_z[0]
     far = -above / drop if drop < -1e-6 else FAR_M
-    fill(canvas.red, F(0.0))
-    fill(canvas.green, F(0.0))
-    fill(canvas.blue, F(0.0))
-    if 0.0 < far < FAR_M:
-        fill(depth, F(far))
-        _ground_row(studio, canvas, v, far, drop)
-    else:
-        fill(depth, F(FAR_M))
-        _sky_row(canvas, look, drop)
-    low, high = width, 0
+    ground = 0.0 < far < FAR_M
+    fill(depth, F(far if ground else FAR_M))
     fill(canvas.code, np.int32(-1))
-    for k in range(seen.count[0]):
-        if y < seen.rect[k, 2] or y >= seen.rect[k, 3]:
-            continue
-        a, b = seen.rect[k, 0], seen.rect[k, 1]
-        ray, half = seen.ray[k], boxes.half[seen.source[k]]
-        row = F(y)
-        hit_box(
-            depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k),
-            ray[0], ray[1], ray[2],
-            ray[3] + row * ray[9], ray[4] + row * ray[10], ray[5] + row * ray[11],
-            ray[6], ray[7], ray[8], half[0], half[1], half[2],
-        )  # fmt: skip
-        low, high = min(low, a), max(high, b)
+    _hit_boxes(studio, canvas, y, boxes)
+    if ground:
+        _shadow_row(studio, canvas, v, far)
     tag = canvas.tag[y] if canvas.tag.shape[0] > 1 else canvas.tag[0]
     who = canvas.instance[y] if canvas.instance.shape[0] > 1 else canvas.instance[0]
-    for x in range(width):
-        tag[x] = canvas.last[x] & np.uint8(31)
-    fill(who, np.int32(0))
-    x = low
-    while x < high:
+    x, width = 0, depth.shape[0]
+    while x < width:
         code = canvas.code[x]
         end = x + 1
-        while end < high and canvas.code[end] == code:
+        while end < width and canvas.code[end] == code:
             end += 1
-        if code >= 0:
-            _face(studio, canvas, code, x, end, y)
-            source = seen.source[code // 6]
-            if boxes.material[source] != _DECK or code % 6 != 4:
-                fill(tag[x:end], boxes.tag[source])
+        if code < 0:
+            fill(who[x:end], np.int32(0))
+            if ground:
+                _ground(studio, canvas, x, end, y, v, far, drop, tag)
             else:
-                for i in range(x, end):
-                    tag[i] = canvas.last[i] & np.uint8(31)
-            fill(who[x:end], boxes.instance[source])
+                _sky(canvas, look, x, end, drop)
+                fill(tag[x:end], np.uint8(_SKY))
+        else:
+            source = seen.source[code // 6]
+            fill(who[x:end], studio.boxes.instance[source])
+            fill(tag[x:end], studio.boxes.tag[source])
+            _face(studio, canvas, code, x, end, y, tag)
         x = end
     if cam[15] > 0.0 and look.numbers[5] > 0.0:
         u0, du = F((0.5 - cam[13]) / cam[12]), F(1.0 / cam[12])
@@ -178,39 +182,88 @@ def _row(studio, canvas, y):
 
 
 @kernel
-def _sky_row(canvas, look, drop):
-    """Colours a row of sky, from the horizon up."""
-    k = min(max(drop * 1.1, 0.0), 1.0)
-    k = k * (2.0 - k)
-    fill(canvas.red, F(255.0 * (look.horizon[0] + (look.zenith[0] - look.horizon[0]) * k)))
-    fill(canvas.green, F(255.0 * (look.horizon[1] + (look.zenith[1] - look.horizon[1]) * k)))
-    fill(canvas.blue, F(255.0 * (look.horizon[2] + (look.zenith[2] - look.horizon[2]) * k)))
-    fill(canvas.last, np.uint8(_SKY))
+def _hit_boxes(studio, canvas, y, boxes):
+    """Finds the nearest face at each pixel of a row."""
+    seen, row = studio.seen, F(y)
+    depth = canvas.depth[y]
+    for n in range(boxes.shape[0]):
+        k = boxes[n]
+        a, b = seen.rect[k, 0], seen.rect[k, 1]
+        ray, half = seen.ray[k], studio.boxes.half[seen.source[k]]
+        hit_box(
+            depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k),
+            ray[0], ray[1], ray[2],
+            ray[3] + row * ray[9], ray[4] + row * ray[10], ray[5] + row * ray[11],
+            ray[6], ray[7], ray[8], half[0], half[1], half[2],
+        )  # fmt: skip
 
 
 @kernel
-def _ground_row(studio, canvas, v, far, drop):
-    """Colours a row of the ground plane, all of it `far` ahead."""
-    cam, look, raster = canvas.cam, studio.look, studio.scene.ground
+def _sky(canvas, look, a, b, drop):
+    """Colours a span of sky, by how far above the horizon it is."""
+    k = min(max(drop * 1.1, 0.0), 1.0)
+    k = k * (2.0 - k)
+    for q in range(3):
+        channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
+        fill(channel[a:b], F(255.0 * (look.horizon[q] + (look.zenith[q] - look.horizon[q]) * k)))
+
+
+@kernel
+def _texture(canvas, raster, a, b, y, over, with_last):
+    """Colours a span by a raster that lies level, `over` metres below the camera.
+
+    Where a texel is wider than some pixels, only every second, fourth or eighth is sampled and
+    those between are filled in. Where a pixel is longer than wide, several samples are taken.
+    """
+    cam = canvas.cam
     focal = cam[12]
-    wide = far / focal  # metres across a pixel
-    long = wide * math.sqrt((cam[3] + v * cam[9]) ** 2 + (cam[4] + v * cam[10]) ** 2) / -drop
-    taps = int(min(max(math.floor(long / wide + 0.5), 1.0), _TAPS * 1.0))
+    v = (y + 0.5 - cam[14]) / focal
+    depth = canvas.depth[y, a:b]
+    middle = np.float64(depth[(b - a) // 2])
+    gx, gy = cam[3] + v * cam[9], cam[4] + v * cam[10]
+    flat_m = math.hypot(gx, gy)
+    wide = middle / focal
+    long = wide * max(1.0, middle * flat_m / over)
+    taps = int(min(max(math.floor(long / wide * 0.8), 1.0), _TAPS * 1.0))
     level = _level(max(wide, long / taps))
+    stride = 1
+    while stride < 8 and wide * stride * 4.0 <= TEXEL_M * (1 << level):
+        stride *= 2
+    n = b - a if stride == 1 else (b - a - 1) // stride + 2
+    u, w = canvas.u[:n], canvas.v[:n]
+    red, green, blue = canvas.samples[0, :n], canvas.samples[1, :n], canvas.samples[2, :n]
+    if stride == 1:
+        red, green, blue = canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b]
+    fill(red, F(0.0))
+    fill(green, F(0.0))
+    fill(blue, F(0.0))
     u0 = (0.5 - cam[13]) / focal
+    x0, y0 = cam[0] - raster.origin[0], cam[1] - raster.origin[1]
     for tap in range(taps):
-        vt = v + ((tap + 0.5) / taps - 0.5) / focal
-        fall = cam[5] + vt * cam[11]
-        if fall > -1e-6:
-            fall = -1e-6
-        t = min((cam[2] - studio.scene.base_z[0]) / -fall, FAR_M)
-        x = cam[0] + t * (cam[3] + u0 * cam[6] + vt * cam[9]) - raster.origin[0]
-        y = cam[1] + t * (cam[4] + u0 * cam[7] + vt * cam[10]) - raster.origin[1]
-        line(canvas.u, F(x / TEXEL_M), F(t * cam[6] / focal / TEXEL_M))
-        line(canvas.v, F(y / TEXEL_M), F(t * cam[7] / focal / TEXEL_M))
-        _sample(raster, level, canvas, 0, canvas.u.shape[0], 1.0 / taps)
-    _shadow_row(studio, canvas, v, far)
-    _ground_light(canvas, look, far, drop)
+        shift = ((tap + 0.5) / taps - 0.5) * long / flat_m
+        _places(canvas, u, depth, stride, (x0 + shift * gx, gx + u0 * cam[6], cam[6]), a)
+        _places(canvas, w, depth, stride, (y0 + shift * gy, gy + u0 * cam[7], cam[7]), a)
+        sample(
+            u, w, red, green, blue, raster.texels, raster.start[level], raster.width[level],
+            raster.height[level], F(1.0 / (1 << level)), F(1.0 / taps),
+        )  # fmt: skip
+    if stride > 1:
+        spread(red, canvas.red[a:b], stride)
+        spread(green, canvas.green[a:b], stride)
+        spread(blue, canvas.blue[a:b], stride)
+    if with_last:
+        u, w = canvas.u[: b - a], canvas.v[: b - a]
+        _places(canvas, u, depth, 1, (x0, gx + u0 * cam[6], cam[6]), a)
+        _places(canvas, w, depth, 1, (y0, gy + u0 * cam[7], cam[7]), a)
+        last_bytes(u, w, canvas.last[a:b], raster.texels, raster.width[0], raster.height[0])
+
+
+@kernel
+def _places(canvas, out, depth, stride, terms, a):
+    """Writes places along one axis, in texels: terms are of the camera, of depth, of columns."""
+    start, gain, turn = terms
+    turn = turn / canvas.cam[12]
+    plane_points(out, depth, stride, F(start / TEXEL_M), F(gain / TEXEL_M), F(turn / TEXEL_M), F(a))
 
 
 @kernel
@@ -221,13 +274,14 @@ def _level(footprint_m):
 
 
 @kernel
-def _sample(raster, level, canvas, a, b, weight):
-    """Adds samples of a raster at the row's places to columns [a, b)."""
-    sample(
-        canvas.u[a:b], canvas.v[a:b], canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b],
-        canvas.last[a:b], raster.texels, raster.start[level], raster.width[level],
-        raster.height[level], F(1.0 / (1 << level)), F(weight),
-    )  # fmt: skip
+def _ground(studio, canvas, a, b, y, v, far, drop, tag):
+    """Colours the pixels [a, b) of a row, all of the ground plane."""
+    with_last = canvas.tag.shape[0] > 1 or studio.look.numbers[3] > 0.0
+    over = canvas.cam[2] - studio.scene.base_z[0]
+    _texture(canvas, studio.scene.ground, a, b, y, over, with_last)
+    if with_last:
+        tags_of(canvas.last[a:b], tag[a:b])
+    _ground_light(canvas, studio.look, a, b, far, drop)
 
 
 @kernel
@@ -263,8 +317,8 @@ def _shadow_row(studio, canvas, v, far):
 
 
 @kernel
-def _ground_light(canvas, look, far, drop):
-    """Lights a row of ground, wets it, and hides it in haze."""
+def _ground_light(canvas, look, a, b, far, drop):
+    """Lights a span of ground, wets it, and hides it in haze."""
     numbers = look.numbers
     k = numbers[0] * far
     clear = 1.0 / (1.0 + k + 0.5 * k * k)
@@ -279,18 +333,18 @@ def _ground_light(canvas, look, far, drop):
         sky = 255.0 * (look.horizon[q] * (1.0 - steep) + look.zenith[q] * steep)
         add = 255.0 * look.horizon[q] * (1.0 - clear) + sky * mirror * clear
         channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
-        light_ground(channel, canvas.shadow, F(lit), F(dark), F(add))
+        light_ground(channel[a:b], canvas.shadow[a:b], F(lit), F(dark), F(add))
     if numbers[3] > 0.0:
         share = F((0.25 + 0.6 * graze) * clear)
         puddles(
-            canvas.last, canvas.red, canvas.green, canvas.blue,
+            canvas.last[a:b], canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b],
             np.uint8(4.2 * numbers[3] + 0.8), share,
             F(235.0 * look.horizon[0]), F(235.0 * look.horizon[1]), F(235.0 * look.horizon[2]),
         )  # fmt: skip
 
 
 @kernel
-def _face(studio, canvas, code, a, b, y):
+def _face(studio, canvas, code, a, b, y, tag):
     """Colours the pixels [a, b) of a row, all of one face."""
     seen, look, cam = studio.seen, studio.look, canvas.cam
     source = seen.source[code // 6]
@@ -302,7 +356,7 @@ def _face(studio, canvas, code, a, b, y):
         haze = F(0.25) * haze
     red, green, blue = canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b]
     if material == _DECK and face == 4:
-        _deck(studio, canvas, code, a, b, y)
+        _deck(studio, canvas, code, a, b, y, tag)
         return
     sky_r, sky_g, sky_b = (
         F(255.0 * look.horizon[0]),
@@ -339,29 +393,16 @@ def _face(studio, canvas, code, a, b, y):
 
 
 @kernel
-def _deck(studio, canvas, code, a, b, y):
+def _deck(studio, canvas, code, a, b, y, tag):
     """Colours the top of a deck by the raster of what is elevated."""
-    seen, look, cam, raster = studio.seen, studio.look, canvas.cam, studio.scene.deck
-    depth = canvas.depth[y, a:b]
-    ray = seen.ray[code // 6]
-    focal = cam[12]
-    v = (y + 0.5 - cam[14]) / focal
-    over = max(0.2, ray[2] - studio.boxes.half[seen.source[code // 6], 2])
-    middle = np.float64(depth[(b - a) // 2])
-    wide = middle / focal
-    long = wide * max(1.0, middle / over)
-    level = _level(math.sqrt(wide * long))
-    fx, fy = cam[3] + v * cam[9], cam[4] + v * cam[10]
-    for x in range(b - a):
-        across = (a + x + 0.5 - cam[13]) / focal
-        z = np.float64(depth[x])
-        canvas.u[a + x] = (cam[0] + z * (fx + across * cam[6]) - raster.origin[0]) / TEXEL_M
-        canvas.v[a + x] = (cam[1] + z * (fy + across * cam[7]) - raster.origin[1]) / TEXEL_M
-    for q in range(3):
-        channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
-        fill(channel[a:b], F(0.0))
-    _sample(raster, level, canvas, a, b, 1.0)
+    seen, look = studio.seen, studio.look
+    over = seen.ray[code // 6, 2] - studio.boxes.half[seen.source[code // 6], 2]
+    with_last = canvas.tag.shape[0] > 1
+    _texture(canvas, studio.scene.deck, a, b, y, max(0.2, np.float64(over)), with_last)
+    if with_last:
+        tags_of(canvas.last[a:b], tag[a:b])
     wet = 1.0 - 0.38 * look.numbers[2]
+    depth = canvas.depth[y, a:b]
     for q in range(3):
         channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
         light = wet * (look.ambient[q] + look.sun_colour[q] * look.sun[2])
@@ -425,7 +466,7 @@ def _canvas(camera: CameraConfig, rig: Rig) -> Canvas:
         camera.x_m, camera.y_m, camera.z_m, camera.yaw_rad, camera.pitch_rad,
         camera.focal_px, width / 2.0, height / 2.0, beam,
     )  # fmt: skip
-    rows = [np.zeros(width, np.float32) for _ in range(6)]
+    rows = [np.zeros(width + 2, np.float32) for _ in range(6)]
     # one row is enough of what nobody asks for; two rows tell an image from that
     return Canvas(
         mount=np.array(mount, np.float64),
@@ -434,12 +475,13 @@ def _canvas(camera: CameraConfig, rig: Rig) -> Canvas:
         depth=np.zeros((height, width), np.float32),
         tag=np.zeros((height if rig.semantic else 1, width), np.uint8),
         instance=np.zeros((height if rig.instance else 1, width), np.int32),
-        red=rows[0],
-        green=rows[1],
-        blue=rows[2],
+        red=rows[0][:width],
+        green=rows[1][:width],
+        blue=rows[2][:width],
         u=rows[3],
         v=rows[4],
-        shadow=rows[5],
+        samples=np.zeros((3, width + 2), np.float32),
+        shadow=rows[5][:width],
         last=np.zeros(width, np.uint8),
         code=np.zeros(width, np.int32),
     )

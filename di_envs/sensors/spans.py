@@ -68,20 +68,32 @@ def fill(values, value):
 
 
 @kernel
-def line(values, start, step):
-    """Sets a span to start, start + step, …"""
-    for x in range(values.shape[0]):
-        values[x] = start + F(x) * step
+def plane_points(places, depth, stride, start, gain, turn, first):
+    """Where the rays of every `stride`-th pixel end, in texels along one axis.
+
+    Args:
+        places: (N,) written.
+        depth: Of the row's pixels, from the span's first on.
+        stride: Pixels from one place to the next.
+        start: Of the camera.
+        gain: What a metre of depth adds at column 0.
+        turn: What each column adds to that.
+        first: Column of the span's first pixel.
+    """
+    end = depth.shape[0] - 1
+    for x in range(places.shape[0]):
+        i = x * stride
+        z = depth[i if i < end else end]
+        places[x] = start + z * (gain + (first + F(i)) * turn)
 
 
 @kernel
-def sample(u, v, red, green, blue, last, texels, start, width, height, scale, weight):
+def sample(u, v, red, green, blue, texels, start, width, height, scale, weight):
     """Adds bilinear samples of one level of a raster to a span.
 
     Args:
         u, v: (N,) places in texels of the finest level.
         red, green, blue: (N,) to add to.
-        last: (N,) the last byte of the nearest texel, written.
         texels: All levels of the raster.
         start, width, height: Of the level.
         scale: Its texels for one of the finest level.
@@ -102,9 +114,6 @@ def sample(u, v, red, green, blue, last, texels, start, width, height, scale, we
         at = start + j * width + i
         t00, t01 = np.int64(texels[at]), np.int64(texels[at + 1])
         t10, t11 = np.int64(texels[at + width]), np.int64(texels[at + width + 1])
-        near = t00 if q < 8 else t10
-        far = t01 if q < 8 else t11
-        last[x] = np.uint8((near if p < 8 else far) >> 24)
         w11 = p * q
         w01 = (p << 4) - w11
         w10 = (q << 4) - w11
@@ -117,6 +126,34 @@ def sample(u, v, red, green, blue, last, texels, start, width, height, scale, we
         red[x] += F(s & 1048575) * share
         green[x] += F((s >> 20) & 1048575) * share
         blue[x] += F((s >> 40) & 1048575) * share
+
+
+@kernel
+def last_bytes(u, v, last, texels, width, height):
+    """Reads the last byte of the nearest texel of the finest level."""
+    for x in range(u.shape[0]):
+        i, j = np.int64(u[x]), np.int64(v[x])
+        i = min(max(i, 0), width - 1)
+        j = min(max(j, 0), height - 1)
+        last[x] = np.uint8(texels[j * width + i] >> 24)
+
+
+@kernel
+def tags_of(last, tag):
+    """The tags in texels' last bytes."""
+    for x in range(last.shape[0]):
+        tag[x] = last[x] & np.uint8(31)
+
+
+@kernel
+def spread(samples, colour, stride):
+    """Fills in a span from samples of every `stride`-th pixel."""
+    part = ONE / F(stride)
+    size = colour.shape[0]
+    for k in range((size + stride - 1) // stride):
+        value, step = samples[k], (samples[k + 1] - samples[k]) * part
+        for i in range(min(stride, size - k * stride)):
+            colour[k * stride + i] = value + F(i) * step
 
 
 @kernel
