@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from di_envs.config import RouteEnvConfig, check_name
+from di_envs.observation import Observer, observation_space
 from di_envs.reward import (
     PENALTIES,
     Standing,
@@ -71,6 +73,17 @@ class Course:
                 f"give the string '{route}'. Ids: {', '.join(self.route_ids)}."
             )
         return int(route)
+
+    def observation_space(self) -> spaces.Dict:
+        """The space of what an ego sees."""
+        return observation_space(self.config.observations, self.config.cameras)
+
+    def observer(self) -> Observer:
+        """Looks at a world through the first ego's eyes; `of_ego` makes those of others."""
+        config = self.config
+        return Observer(
+            self.town, config.observations, cameras=config.cameras, weather=config.weather
+        )
 
     def ending(
         self, view: WorldView, ego: int, before: Standing, after: Standing

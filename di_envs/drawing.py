@@ -5,12 +5,10 @@ Used by whatever draws: the environments' renderer and the documentation's pictu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, LightState, SignalKind
+from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, LightState, SignalKind, Signals
 from di_envs.world.kinds import ActorKind
 from di_envs.world.world import WorldView
 
@@ -71,15 +69,23 @@ def crosswalk_bars(walks: Crosswalks) -> list[Array]:
     return bars
 
 
-def stop_lines(view: WorldView) -> Iterator[tuple[Array, str, float]]:
-    """Each stop line: its ends (2, 2), the colour its light shows (white for signs), its height."""
-    signals, state = view.town.signals, view.state
-    for index, pose in enumerate(signals.stop_pose):
-        signal = signals.stop_signal[index]
-        across = np.array([-np.sin(pose[3]), np.cos(pose[3])]) * 0.45 * signals.stop_width_m[index]
-        is_light = signals.kind[signal] == SignalKind.LIGHT
-        colour = LIGHT[LightState(int(state.light[signal]))] if is_light else "#ffffff"
-        yield np.array([pose[:2] - across, pose[:2] + across]), colour, float(pose[2])
+def stop_line_ends(signals: Signals) -> Array:
+    """Both ends (K, 2, 2) of each stop line."""
+    yaw = signals.stop_pose[:, 3]
+    across = np.stack([-np.sin(yaw), np.cos(yaw)], axis=1) * 0.45 * signals.stop_width_m[:, None]
+    middle = signals.stop_pose[:, :2]
+    return np.stack([middle - across, middle + across], axis=1)
+
+
+def stop_line_colours(view: WorldView) -> list[str]:
+    """The colour that the light of each stop line shows (K,); white for signs."""
+    signals = view.town.signals
+    lights = view.state.light[signals.stop_signal].tolist()
+    is_light = signals.kind[signals.stop_signal] == SignalKind.LIGHT
+    return [
+        LIGHT[LightState(light)] if shows else "#ffffff"
+        for light, shows in zip(lights, is_light.tolist(), strict=True)
+    ]
 
 
 def box(x: float, y: float, yaw: float, half_length: float, half_width: float) -> Array:

@@ -22,8 +22,8 @@ from di_envs.actions import action_space, checked_action
 from di_envs.config import check_name
 from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
-from di_envs.observation import Observer, observation_space
 from di_envs.reward import standing_of
+from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import ActorKind
 from di_envs.world.world import Snapshot, World, WorldView
@@ -58,7 +58,11 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         agents: Names of the egos that are still driving.
     """
 
-    metadata = {"name": "driveinsight_v0", "render_modes": [], "render_fps": 20}  # noqa: RUF012
+    metadata = {  # noqa: RUF012 (PettingZoo's own contract)
+        "name": "driveinsight_v0",
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
 
     def __init__(self, egos: int = 2, *, render_mode: str | None = None, **options: Any) -> None:
         """Loads the town and plans the routes.
@@ -71,6 +75,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         Raises:
             ValueError: If an option is refused, or there are fewer routes than egos.
         """
+        check_render_mode(render_mode)
         if egos < 1:
             raise ValueError(f"egos must be at least 1; got {egos!r}.")
         self._course = course = load_course(options)
@@ -81,19 +86,15 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
                 f"{', '.join(course.route_ids)}."
             )
         self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
+        self._screen = None if render_mode is None else Screen(course, render_mode)
         self.world = World(course.town, course.world_config)
         self.possible_agents = [f"ego_{ego}" for ego in range(egos)]
         self.agents: list[str] = []
-        space = observation_space(self.config.observations, self.config.cameras)
+        space = course.observation_space()
         self._observation_spaces = {name: copy.deepcopy(space) for name in self.possible_agents}
         self._action_spaces = {name: action_space() for name in self.possible_agents}
-        first = Observer(
-            course.town,
-            self.config.observations,
-            0,
-            cameras=self.config.cameras,
-            weather=self.config.weather,
-        )
+        first = course.observer()
         self._observers = [first.of_ego(ego) for ego in range(egos)]
         self._np_random, _ = seeding.np_random(None)
 
@@ -145,7 +146,10 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         for ego, name in enumerate(self.agents):
             standing = standing_of(view.state, ego)
             infos[name] = self._course.info(view, ego, standing, standing, ())
-        return self._observe(), infos
+        observations = self._observe()
+        if self.render_mode == "human":
+            self._draw(self.agents[0], observations)
+        return observations, infos
 
     def step(self, actions: Mapping[str, Any]) -> Steps:
         """Holds each ego's action for `control_dt_s`.
@@ -172,11 +176,29 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
             infos[name] = self._course.info(view, ego, before[ego], after, own)
             rewards[name] = sum(infos[name]["reward_terms"].values())
         observations = self._observe()
+        if self.render_mode == "human":
+            self._draw(self.agents[0], observations)
         for name, ego in driving.items():
             if terminated[name] or truncated[name]:
                 self.world.remove_ego(ego)
                 self.agents.remove(name)
         return observations, rewards, terminated, truncated, infos
+
+    def render(self, agent: str | None = None) -> Any:
+        """A picture (H, W, 3) uint8 around an ego; None unless the mode is `rgb_array`.
+
+        Args:
+            agent: Whom it follows; the first that is still driving, or the first of all.
+        """
+        followed = self._known(agent or (self.agents or self.possible_agents)[0])
+        if self.render_mode != "rgb_array":
+            return None
+        return self._draw(followed, {})
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._screen is not None:
+            self._screen.close()
 
     def save_state(self) -> MultiEgoSnapshot:
         """A value from which `restore_state` brings everything back. See `di_envs.save`."""
@@ -192,6 +214,12 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         if snapshot.world is not None:
             self.world.restore(snapshot.world)
             self._start()
+
+    def _draw(self, agent: str, observations: Mapping[str, Observation]) -> Any:
+        assert self._screen is not None
+        ego = self.possible_agents.index(agent)
+        seen = observations.get(agent) or self._observers[ego].observe()
+        return self._screen.draw(self.view, ego, seen)
 
     def _start(self) -> None:
         """Takes up the world's episode: those egos drive that are on the road."""

@@ -14,8 +14,8 @@ from di_envs.actions import action_space, checked_action
 from di_envs.config import check_name
 from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
-from di_envs.observation import Observer, observation_space
 from di_envs.reward import standing_of
+from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Snapshot, World, WorldView
 
@@ -58,33 +58,35 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         plans: The routes that there are to drive, in the order of `route_ids`.
     """
 
-    metadata = {"render_modes": [], "render_fps": 20}  # noqa: RUF012 (Gymnasium's own contract)
+    metadata = {  # noqa: RUF012 (Gymnasium's own contract)
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
 
-    def __init__(self, *, render_mode: None = None, **options: Any) -> None:
+    def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
         """Loads the town and plans the routes.
 
         Args:
-            render_mode: None; there is no renderer yet.
+            render_mode: `rgb_array`: `render` returns a picture for people, see
+                `di_envs.render`. `human`: a window shows it after each reset and step. None: no
+                pictures.
             options: See `RouteEnvConfig`.
 
         Raises:
             ValueError: If an option is unknown or refused, or a route cannot be planned.
             FileNotFoundError: If there is no such town.
+            RuntimeError: If there is no display for `human`.
         """
-        if render_mode is not None:
-            raise ValueError(f"RouteEnv has no render mode yet; got render_mode={render_mode!r}.")
+        check_render_mode(render_mode)
         self._course = course = load_course(options)
         self.config, self.plans = course.config, course.plans
         self.world = World(course.town, course.world_config)
-        self.observation_space = observation_space(self.config.observations, self.config.cameras)
+        self.observation_space = course.observation_space()
         self.action_space = action_space()
-        self._observer = Observer(
-            course.town,
-            self.config.observations,
-            _EGO,
-            cameras=self.config.cameras,
-            weather=self.config.weather,
-        )
+        self._observer = course.observer()
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
+        self._screen = None if render_mode is None else Screen(course, render_mode)
         self._begun = False
         self._over = True
 
@@ -128,7 +130,10 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._observer.start(self.view)
         standing = standing_of(self.view.state, _EGO)
         info = self._course.info(self.view, _EGO, standing, standing, ())
-        return self._observer.observe(), info
+        observation = self._observer.observe()
+        if self.render_mode == "human":
+            self._draw(observation)
+        return observation, info
 
     def step(self, action: np.ndarray[Any, Any]) -> tuple[Observation, float, bool, bool, Info]:
         """Holds an action for `control_dt_s`.
@@ -153,7 +158,27 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._over = terminated or truncated
         info = course.info(view, _EGO, before, after, events)
         reward = sum(info["reward_terms"].values())
-        return self._observer.observe(), reward, terminated, truncated, info
+        observation = self._observer.observe()
+        if self.render_mode == "human":
+            self._draw(observation)
+        return observation, reward, terminated, truncated, info
+
+    def render(self) -> Any:
+        """A picture of the present state, (H, W, 3) uint8; None unless the mode is `rgb_array`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        if not self._begun:
+            raise gymnasium.error.ResetNeeded("There is nothing to see yet. Call reset() first.")
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing: make it with render_mode='rgb_array'.")
+        return self._draw(self._observer.observe()) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._screen is not None:
+            self._screen.close()
 
     def observe(self) -> Observation:
         """The present observation once more: after `restore`, for instance. Changes nothing."""
@@ -195,6 +220,11 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         twin._begun, twin._over = False, True
         twin._np_random, twin._np_random_seed = None, None
         return twin
+
+    def _draw(self, observation: Observation) -> Any:
+        """Shows the present state in the window, or returns the picture."""
+        assert self._screen is not None
+        return self._screen.draw(self.view, _EGO, observation)
 
     def _route_index(self, options: dict[str, Any], world_seed: int) -> int:
         for option in options:

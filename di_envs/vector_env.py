@@ -58,7 +58,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
                 the last one in `info["final_obs"]`. `Disabled`: the caller resets with
                 `options={"reset_mask": …}`.
             max_episode_steps: Truncates episodes after so many steps.
-            render_mode: As `RouteEnv` takes it.
+            render_mode: None, or `rgb_array`: `render` returns a picture of each world.
             options: See `RouteEnvConfig`.
 
         Raises:
@@ -73,6 +73,11 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         ):
             if value < 1:
                 raise ValueError(f"{name} must be at least 1; got {value!r}.")
+        if render_mode == "human":
+            raise ValueError(
+                "Many worlds have no window: use render_mode='rgb_array', or gymnasium.make for "
+                "one of them."
+            )
         first = RouteEnv(render_mode=render_mode, **options)
         self.envs = (first, *(first.twin() for _ in range(num_envs - 1)))
         self.num_envs, self.threads = num_envs, threads

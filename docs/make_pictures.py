@@ -33,7 +33,8 @@ from di_envs.drawing import (
     Array,
     box,
     crosswalk_bars,
-    stop_lines,
+    stop_line_colours,
+    stop_line_ends,
     surfaces,
 )
 from di_envs.map_chunks import MapKind, build_map_chunks
@@ -125,9 +126,10 @@ def draw_crosswalks(axes: Axes, view: WorldView) -> None:
 
 def draw_signals(axes: Axes, view: WorldView, *, line_width: float) -> None:
     """Stop lines in the colour that their light shows."""
-    segments, colours, _ = zip(*stop_lines(view), strict=True)
+    lines = list(stop_line_ends(view.town.signals))
+    colours = stop_line_colours(view)
     axes.add_collection(
-        LineCollection(segments, colors=colours, linewidth=line_width, zorder=6, capstyle="butt")
+        LineCollection(lines, colors=colours, linewidth=line_width, zorder=6, capstyle="butt")
     )
 
 
