@@ -34,7 +34,7 @@ class Material(IntEnum):
 class Boxes(NamedTuple):
     """Room for B boxes; those before `count[0]` are there."""
 
-    count: NDArray[np.int64]  # (1,)
+    count: NDArray[np.int64]  # type: ignore[assignment]  # (1,)
     centre: NDArray[np.float64]  # (B, 3) x, y, z of the middle
     yaw: NDArray[np.float32]  # (B,) rad
     pitch: NDArray[np.float32]  # (B,) rad

@@ -56,7 +56,7 @@ from di_envs.world.world import WorldView
 
 FAR_M = 1000.0  # depth of the sky
 RANGE_M = 220.0  # boxes further from the ego are not seen
-_TAPS = 6  # samples along the road for a row that is far longer than wide
+_TAPS = 4  # samples along the road for a row that is far longer than wide
 _PLAIN, _WINDOWS, _DECK = int(Material.PLAIN), int(Material.WINDOWS), int(Material.DECK)
 _FOLIAGE, _LAMP = int(Material.FOLIAGE), int(Material.LAMP)
 _SKY = int(Tag.SKY)
@@ -71,7 +71,7 @@ class Canvas(NamedTuple):
     cam: NDArray[np.float64]  # (16,) its numbers at the moment
     rgb: NDArray[np.uint8]  # (H, 3 W)
     depth: NDArray[np.float32]  # (H, W)
-    tag: NDArray[np.uint8]  # (H, W), or (1, W) where it is not asked for
+    tag: NDArray[np.uint8]  # (H, W), or (0, W) where it is not asked for
     instance: NDArray[np.int32]  # alike
     red: NDArray[np.float32]  # (W,)
     green: NDArray[np.float32]
@@ -148,28 +148,33 @@ def _row(studio, canvas, y, boxes):
     ground = 0.0 < far < FAR_M
     fill(depth, F(far if ground else FAR_M))
     fill(canvas.code, np.int32(-1))
-    _hit_boxes(studio, canvas, y, boxes)
+    low, high = _hit_boxes(studio, canvas, y, boxes)
     if ground:
         _shadow_row(studio, canvas, v, far)
-    tag = canvas.tag[y] if canvas.tag.shape[0] > 1 else canvas.tag[0]
-    who = canvas.instance[y] if canvas.instance.shape[0] > 1 else canvas.instance[0]
+    with_tag, with_who = canvas.tag.shape[0] > 0, canvas.instance.shape[0] > 0
+    tag = canvas.tag[y] if with_tag else canvas.last
+    who = canvas.instance[y] if with_who else canvas.code
     x, width = 0, depth.shape[0]
     while x < width:
         code = canvas.code[x]
-        end = x + 1
-        while end < width and canvas.code[end] == code:
+        end = low if x < low else (x + 1 if x < high else width)
+        while end < high and canvas.code[end] == code:
             end += 1
         if code < 0:
-            fill(who[x:end], np.int32(0))
+            if with_who:
+                fill(who[x:end], np.int32(0))
             if ground:
                 _ground(studio, canvas, x, end, y, v, far, drop, tag)
             else:
                 _sky(canvas, look, x, end, drop)
-                fill(tag[x:end], np.uint8(_SKY))
+                if with_tag:
+                    fill(tag[x:end], np.uint8(_SKY))
         else:
             source = seen.source[code // 6]
-            fill(who[x:end], studio.boxes.instance[source])
-            fill(tag[x:end], studio.boxes.tag[source])
+            if with_who:
+                fill(who[x:end], studio.boxes.instance[source])
+            if with_tag:
+                fill(tag[x:end], studio.boxes.tag[source])
             _face(studio, canvas, code, x, end, y, tag)
         x = end
     if cam[15] > 0.0 and look.numbers[5] > 0.0:
@@ -183,12 +188,14 @@ def _row(studio, canvas, y, boxes):
 
 @kernel
 def _hit_boxes(studio, canvas, y, boxes):
-    """Finds the nearest face at each pixel of a row."""
+    """Finds the nearest face at each pixel of a row; returns the columns that boxes may cover."""
     seen, row = studio.seen, F(y)
+    low, high = canvas.code.shape[0], 0
     depth = canvas.depth[y]
     for n in range(boxes.shape[0]):
         k = boxes[n]
         a, b = seen.rect[k, 0], seen.rect[k, 1]
+        low, high = min(low, a), max(high, b)
         ray, half = seen.ray[k], studio.boxes.half[seen.source[k]]
         hit_box(
             depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k),
@@ -196,13 +203,14 @@ def _hit_boxes(studio, canvas, y, boxes):
             ray[3] + row * ray[9], ray[4] + row * ray[10], ray[5] + row * ray[11],
             ray[6], ray[7], ray[8], half[0], half[1], half[2],
         )  # fmt: skip
+    return low, high
 
 
 @kernel
 def _sky(canvas, look, a, b, drop):
     """Colours a span of sky, by how far above the horizon it is."""
-    k = min(max(drop * 1.1, 0.0), 1.0)
-    k = k * (2.0 - k)
+    up = max(0.0, drop) / math.sqrt(1.0 + drop * drop)
+    k = 1.4 * up / (0.4 + up)
     for q in range(3):
         channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
         fill(channel[a:b], F(255.0 * (look.horizon[q] + (look.zenith[q] - look.horizon[q]) * k)))
@@ -224,10 +232,10 @@ def _texture(canvas, raster, a, b, y, over, with_last):
     flat_m = math.hypot(gx, gy)
     wide = middle / focal
     long = wide * max(1.0, middle * flat_m / over)
-    taps = int(min(max(math.floor(long / wide * 0.8), 1.0), _TAPS * 1.0))
+    taps = int(min(max(math.floor(long / wide * 0.6), 1.0), _TAPS * 1.0))
     level = _level(max(wide, long / taps))
     stride = 1
-    while stride < 8 and wide * stride * 4.0 <= TEXEL_M * (1 << level):
+    while stride < 8 and wide * stride * 3.0 <= TEXEL_M * (1 << level):
         stride *= 2
     n = b - a if stride == 1 else (b - a - 1) // stride + 2
     u, w = canvas.u[:n], canvas.v[:n]
@@ -276,11 +284,12 @@ def _level(footprint_m):
 @kernel
 def _ground(studio, canvas, a, b, y, v, far, drop, tag):
     """Colours the pixels [a, b) of a row, all of the ground plane."""
-    with_last = canvas.tag.shape[0] > 1 or studio.look.numbers[3] > 0.0
+    with_last = canvas.tag.shape[0] > 0 or studio.look.numbers[3] > 0.0
     over = canvas.cam[2] - studio.scene.base_z[0]
     _texture(canvas, studio.scene.ground, a, b, y, over, with_last)
     if with_last:
-        tags_of(canvas.last[a:b], tag[a:b])
+        if canvas.tag.shape[0] > 0:
+            tags_of(canvas.last[a:b], tag[a:b])
     _ground_light(canvas, studio.look, a, b, far, drop)
 
 
@@ -296,6 +305,8 @@ def _shadow_row(studio, canvas, v, far):
     y0 = far * (cam[4] + u0 * cam[7] + v * cam[10])
     dx, dy = far * cam[6] / focal, far * cam[7] / focal
     flat_m = far * math.hypot(cam[3] + v * cam[9], cam[4] + v * cam[10])
+    above = max(0.1, cam[2] - studio.scene.base_z[0])
+    long = far / focal * max(1.0, flat_m / above)  # of a pixel, along the road
     for k in range(seen.count[1]):
         row = seen.shadow[k]
         if flat_m < row[12] or flat_m > row[13]:
@@ -313,7 +324,9 @@ def _shadow_row(studio, canvas, v, far):
         if end > start:
             first = max(0, math.floor(start))
             stop = min(width, math.ceil(end) + 1)
-            shade_span(canvas.shadow[first:stop], F(first), F(start), F(end))
+            shade_span(
+                canvas.shadow[first:stop], F(first), F(start), F(end), F(min(1.0, row[14] / long))
+            )
 
 
 @kernel
@@ -338,7 +351,7 @@ def _ground_light(canvas, look, a, b, far, drop):
         share = F((0.25 + 0.6 * graze) * clear)
         puddles(
             canvas.last[a:b], canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b],
-            np.uint8(4.2 * numbers[3] + 0.8), share,
+            np.uint8(3.0 * numbers[3] + 1.0), share,
             F(235.0 * look.horizon[0]), F(235.0 * look.horizon[1]), F(235.0 * look.horizon[2]),
         )  # fmt: skip
 
@@ -397,7 +410,7 @@ def _deck(studio, canvas, code, a, b, y, tag):
     """Colours the top of a deck by the raster of what is elevated."""
     seen, look = studio.seen, studio.look
     over = seen.ray[code // 6, 2] - studio.boxes.half[seen.source[code // 6], 2]
-    with_last = canvas.tag.shape[0] > 1
+    with_last = canvas.tag.shape[0] > 0
     _texture(canvas, studio.scene.deck, a, b, y, max(0.2, np.float64(over)), with_last)
     if with_last:
         tags_of(canvas.last[a:b], tag[a:b])
@@ -467,14 +480,13 @@ def _canvas(camera: CameraConfig, rig: Rig) -> Canvas:
         camera.focal_px, width / 2.0, height / 2.0, beam,
     )  # fmt: skip
     rows = [np.zeros(width + 2, np.float32) for _ in range(6)]
-    # one row is enough of what nobody asks for; two rows tell an image from that
     return Canvas(
         mount=np.array(mount, np.float64),
         cam=np.zeros(16),
         rgb=np.zeros((height, 3 * width), np.uint8),
         depth=np.zeros((height, width), np.float32),
-        tag=np.zeros((height if rig.semantic else 1, width), np.uint8),
-        instance=np.zeros((height if rig.instance else 1, width), np.int32),
+        tag=np.zeros((height if rig.semantic else 0, width), np.uint8),
+        instance=np.zeros((height if rig.instance else 0, width), np.int32),
         red=rows[0][:width],
         green=rows[1][:width],
         blue=rows[2][:width],

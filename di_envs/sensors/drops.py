@@ -12,6 +12,7 @@ from di_envs.keyed_random import keyed_hash
 from di_envs.sensors.boxes import Material
 
 BLOOM_PX = 0.85  # least radius of a shining lamp: what is half a pixel wide is seen all the same
+FADE_M = 160.0  # where a lamp is no longer seen; it fades from half of that on
 _LAMP = int(Material.LAMP)
 _RAIN = 15  # Stream.RAIN, as a plain number for kernels
 _STREAKS = 1.0 / 700.0  # of pixels, in the hardest rain
@@ -38,20 +39,22 @@ def add_glow(boxes, seen, cam, depth, rgb):
         if depth[row, column] < ahead - 0.35:
             continue
         size = np.float64(min(boxes.half[b, 1], boxes.half[b, 2])) * cam[12] / ahead
-        _disc(x, y, max(size, BLOOM_PX), boxes.colour[b], rgb)
+        share = min(1.0, max(0.0, (FADE_M - ahead) / (0.5 * FADE_M)))
+        _disc(x, y, size, share, boxes.colour[b], rgb)
 
 
 @kernel
-def _disc(x, y, radius, colour, rgb):
-    """Blends a disc of light and its halo into an image."""
-    halo = 2.0 * radius + 0.5
+def _disc(x, y, size, strength, colour, rgb):
+    """Blends a disc of light of a size [px] and its halo into an image."""
+    radius = max(size, BLOOM_PX)
+    halo = max(radius + 0.6, 2.0 * size)
     height, width = rgb.shape[0], rgb.shape[1] // 3
     for row in range(max(0, int(y - halo)), min(height, int(y + halo) + 1)):
         for column in range(max(0, int(x - halo)), min(width, int(x + halo) + 1)):
             off = math.hypot(column + 0.5 - x, row + 0.5 - y)
             core = min(max(radius + 0.5 - off, 0.0), 1.0)
             glow = max(0.0, 1.0 - off / halo)
-            share = max(core, 0.45 * glow * glow)
+            share = strength * max(core, 0.45 * glow * glow)
             for q in range(3):
                 old = np.float64(rgb[row, 3 * column + q])
                 new = old + share * (255.0 * colour[q] - old)

@@ -27,7 +27,7 @@ EYE, AHEAD, RIGHT, DOWN, FOCAL, CX, CY, BEAM = 0, 3, 6, 9, 12, 13, 14, 15
 class Projected(NamedTuple):
     """The V boxes that one camera sees, in the order of the collection, and shadows."""
 
-    count: NDArray[np.int64]  # (2,) boxes, shadows
+    count: NDArray[np.int64]  # type: ignore[assignment]  # (2,) boxes, shadows
     source: NDArray[np.int32]  # (V,) index among the collected boxes
     rect: NDArray[np.int32]  # (V, 4) first and end column, first and end row
     ray: NDArray[np.float32]  # (V, 12) camera in the box's frame, ray of pixel (0, 0), and steps
@@ -192,7 +192,7 @@ def project_shadows(cam, boxes, look, base_z, out):
     """Prepares the shadows that boxes cast on the plane, as what three strips have in common.
 
     A row of `out.shadow` holds, for each strip, its normal (x, y), its least and greatest value
-    along it, and then the least and greatest depth ahead of the camera, of 16 columns.
+    along it, then the least and greatest way ahead of the camera, and its least width.
     """
     out.count[1] = 0
     sun_x, sun_y, sun_z = np.float64(look.sun[0]), np.float64(look.sun[1]), np.float64(look.sun[2])
@@ -206,7 +206,7 @@ def project_shadows(cam, boxes, look, base_z, out):
             np.float64(boxes.half[b, 1]),
             np.float64(boxes.half[b, 2]),
         )
-        if hz < 0.3 and (hx < 0.3 or hy < 0.3):
+        if hz < 0.3 and (hx < 0.3 or hy < 0.3) and boxes.centre[b, 2] - base_z < 4.0:
             continue
         dx, dy = boxes.centre[b, 0] - cam[0], boxes.centre[b, 1] - cam[1]
         reach = SHADOW_RANGE_M + hx + hy
@@ -246,5 +246,6 @@ def _shadow(cam, boxes, b, hx, hy, bottom, top, fall_x, fall_y, fall, row):
     fx, fy = cam[3] / flat, cam[4] / flat
     half = abs(fx * c + fy * s) * hx + abs(fy * c - fx * s) * hy
     near, add = fx * x + fy * y, fx * long_x + fy * long_y
+    row[14] = 2.0 * min(row[3] - row[2], row[7] - row[6])  # how wide it is at least
     row[12] = near - half + min(0.0, add)
     row[13] = near + half + max(0.0, add)

@@ -189,7 +189,7 @@ def _decks(slabs: list[dict[str, Any]], base_z: float, free: FreeGround) -> Iter
                 )
             far = side * slab["half_width"] * 0.55
             x, y = slab["x"] - s * far, slab["y"] + c * far
-            if above > EMBANKMENT_M and number % every == 0 and free.is_free(x, y, 1.0, 1.0):
+            if above > EMBANKMENT_M and number % every == 0 and free.is_free(x, y, 1.3, 1.3):
                 high = above - DECK_THICKNESS_M
                 yield BoxSpec(
                     centre=(x, y, base_z + high / 2.0),
@@ -293,7 +293,7 @@ def _trees(base_z: float, free: FreeGround, origin: NDArray[np.float64]) -> Iter
                 tag=Tag.VEGETATION,
             )
             for k, (spread, up, tall) in enumerate(
-                ((1.0, 0.58, 0.17), (0.72, 0.78, 0.22), (0.85, 0.50, 0.12))
+                ((1.0, 0.62, 0.16), (0.72, 0.80, 0.20), (0.85, 0.57, 0.11))
             ):
                 yield BoxSpec(
                     centre=(x, y, base_z + up * high),

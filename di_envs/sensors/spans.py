@@ -118,23 +118,25 @@ def sample(u, v, red, green, blue, texels, start, width, height, scale, weight):
         w01 = (p << 4) - w11
         w10 = (q << 4) - w11
         w00 = 256 - w11 - w01 - w10
-        # the three colours side by side in one word, 20 bits each, weighed by 256ths
-        s = ((t00 & 255) | ((t00 & 65280) << 12) | ((t00 & 16711680) << 24)) * w00
-        s += ((t01 & 255) | ((t01 & 65280) << 12) | ((t01 & 16711680) << 24)) * w01
-        s += ((t10 & 255) | ((t10 & 65280) << 12) | ((t10 & 16711680) << 24)) * w10
-        s += ((t11 & 255) | ((t11 & 65280) << 12) | ((t11 & 16711680) << 24)) * w11
-        red[x] += F(s & 1048575) * share
-        green[x] += F((s >> 20) & 1048575) * share
-        blue[x] += F((s >> 40) & 1048575) * share
+        # the three colours side by side in one word, 16 bits each, weighed by 256ths
+        s = ((t00 & 0xFF00FF) | ((t00 & 0xFF00) << 24)) * w00
+        s += ((t01 & 0xFF00FF) | ((t01 & 0xFF00) << 24)) * w01
+        s += ((t10 & 0xFF00FF) | ((t10 & 0xFF00) << 24)) * w10
+        s += ((t11 & 0xFF00FF) | ((t11 & 0xFF00) << 24)) * w11
+        red[x] += F(s & 0xFFFF) * share
+        green[x] += F((s >> 32) & 0xFFFF) * share
+        blue[x] += F((s >> 16) & 0xFFFF) * share
 
 
 @kernel
 def last_bytes(u, v, last, texels, width, height):
     """Reads the last byte of the nearest texel of the finest level."""
     for x in range(u.shape[0]):
-        i, j = np.int64(u[x]), np.int64(v[x])
-        i = min(max(i, 0), width - 1)
-        j = min(max(j, 0), height - 1)
+        i, j = int(u[x]), int(v[x])
+        i = i if i > 0 else 0
+        j = j if j > 0 else 0
+        i = i if i < width else width - 1
+        j = j if j < height else height - 1
         last[x] = np.uint8(texels[j * width + i] >> 24)
 
 
@@ -147,13 +149,25 @@ def tags_of(last, tag):
 
 @kernel
 def spread(samples, colour, stride):
-    """Fills in a span from samples of every `stride`-th pixel."""
-    part = ONE / F(stride)
-    size = colour.shape[0]
-    for k in range((size + stride - 1) // stride):
-        value, step = samples[k], (samples[k + 1] - samples[k]) * part
-        for i in range(min(stride, size - k * stride)):
-            colour[k * stride + i] = value + F(i) * step
+    """Fills in a span from samples of every second, fourth or eighth pixel."""
+    whole = colour.shape[0] // stride
+    if stride == 8:  # loops of a known length become straight vector code
+        for k in range(whole):
+            value, step = samples[k], (samples[k + 1] - samples[k]) * F(0.125)
+            for i in range(8):
+                colour[8 * k + i] = value + F(i) * step
+    elif stride == 4:
+        for k in range(whole):
+            value, step = samples[k], (samples[k + 1] - samples[k]) * F(0.25)
+            for i in range(4):
+                colour[4 * k + i] = value + F(i) * step
+    else:
+        for k in range(whole):
+            colour[2 * k] = samples[k]
+            colour[2 * k + 1] = HALF * (samples[k] + samples[k + 1])
+    for x in range(whole * stride, colour.shape[0]):
+        share = F(x - whole * stride) / F(stride)
+        colour[x] = samples[whole] + (samples[whole + 1] - samples[whole]) * share
 
 
 @kernel
@@ -168,21 +182,22 @@ def puddles(last, red, green, blue, level, share, r, g, b):
     """Covers the low places of a span with water that shows the sky."""
     for x in range(last.shape[0]):
         tag = last[x] & 31
-        wet = (last[x] >> 5) < level and (tag == 1 or tag == 24)
-        k = share if wet else ZERO
+        deep = F(level) - F(last[x] >> 5)
+        deep = deep if deep < F(2.0) else F(2.0)
+        k = share * HALF * deep if deep > ZERO and (tag == 1 or tag == 24) else ZERO
         red[x] += (r - red[x]) * k
         green[x] += (g - green[x]) * k
         blue[x] += (b - blue[x]) * k
 
 
 @kernel
-def shade_span(shadow, first, start, end):
+def shade_span(shadow, first, start, end, strength):
     """Marks a stretch of a row as in shadow, its ends softened over a pixel."""
     for x in range(shadow.shape[0]):
         at = first + F(x)
         a, b = at - start + HALF, end - at + HALF
         k = a if a < b else b
-        k = k if k < ONE else ONE
+        k = (k if k < ONE else ONE) * strength
         shadow[x] = k if k > shadow[x] else shadow[x]
 
 
@@ -234,7 +249,7 @@ def mottle(pattern, depth, first, q0, qa, qb, p0, pa, pb, s0, sa, sb, pixel):
         p = np.int64(np.floor((p0 + depth[x] * (pa + at * pb)) * F(2.7)))
         s = np.int64(np.floor((s0 + depth[x] * (sa + at * sb)) * F(2.7)))
         h = (q * 73856093) ^ (p * 19349663) ^ (s * 83492791)
-        h = (h ^ (h >> 7)) & 255
+        h = (((h & 0xFFFFFF) * 40503) >> 12) & 255
         fade = F(1.3) - depth[x] * pixel * F(2.5)
         fade = fade if fade > ZERO else ZERO
         fade = fade if fade < ONE else ONE

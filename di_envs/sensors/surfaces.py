@@ -28,10 +28,12 @@ LEVELS = 8
 ELEVATED_M = 0.05  # above the plane from which a lane is on a deck
 LINE_M = 0.15  # width of a lane line
 LINE_INSET_M = 0.12  # of its middle from the lane's edge
+MIDDLE_INSET_M = 0.18  # alike for the yellow line, two of which side by side stay two
 DASH_M, DASH_EVERY_M = 3.0, 9.0
 STOP_LINE_M = 0.4
 BAR_M = 0.5  # width of a crosswalk's bars, and of the gaps between
 ISLAND_M2 = 60.0  # grass enclosed by lanes of a junction is paved up to this size
+_COARSE = 4  # texels between the places at which slow variation is drawn
 _SCENERY = 14  # Stream.SCENERY, as a plain number for kernels
 
 WHITE, YELLOW = (225, 225, 220), (222, 178, 50)
@@ -244,23 +246,37 @@ def _pack(r, g, b, last):
 def _colour(classes, colours, grain, tags, level):
     """Colours classes, with a grain and slow variation, and says how low each road texel lies."""
     rows, columns = classes.shape
-    block = 4  # the slow variation is the same over so many texels a side
-    for row in range(0, rows, block):
-        for column in range(0, columns, block):
-            slow = _smooth(column, row, 24) - 0.5
-            low = int(8.0 * _smooth(column + 9000, row, 32))
-            for i in range(row, min(rows, row + block)):
-                for j in range(column, min(columns, column + block)):
-                    class_ = classes[i, j]
-                    noise = float(keyed_hash(1, _SCENERY, i, j) & np.uint64(255)) / 255.0 - 0.5
-                    add = grain[class_] * (noise + 0.7 * slow)
-                    wet = low if class_ == 1 or class_ == 2 else 0
-                    level[i, j] = _pack(
-                        colours[class_, 0] + add,
-                        colours[class_, 1] + add,
-                        colours[class_, 2] + add,
-                        tags[class_] | (wet << TAG_BITS),
-                    )
+    coarse = np.zeros((rows // _COARSE + 2, columns // _COARSE + 2, 2))
+    for i in range(coarse.shape[0]):
+        for j in range(coarse.shape[1]):
+            coarse[i, j, 0] = _smooth(j * _COARSE, i * _COARSE, 24) - 0.5
+            fine = _smooth(j * _COARSE + 9000, i * _COARSE, 9)
+            coarse[i, j, 1] = 8.0 * (0.5 * coarse[i, j, 0] + 0.25 + 0.5 * fine)
+    for i in range(rows):
+        k, v = i // _COARSE, (i % _COARSE) / _COARSE
+        for j in range(columns):
+            m, u = j // _COARSE, (j % _COARSE) / _COARSE
+            class_ = classes[i, j]
+            slow = _between(coarse[k, m, 0], coarse[k, m + 1, 0],
+                            coarse[k + 1, m, 0], coarse[k + 1, m + 1, 0], u, v)  # fmt: skip
+            low = 0
+            if class_ == 1 or class_ == 2:
+                low = int(_between(coarse[k, m, 1], coarse[k, m + 1, 1],
+                                   coarse[k + 1, m, 1], coarse[k + 1, m + 1, 1], u, v))  # fmt: skip
+            noise = float(keyed_hash(1, _SCENERY, i, j) & np.uint64(255)) / 255.0 - 0.5
+            add = grain[class_] * (noise + 0.7 * slow)
+            level[i, j] = _pack(
+                colours[class_, 0] + add,
+                colours[class_, 1] + add,
+                colours[class_, 2] + add,
+                tags[class_] | (min(max(low, 0), 7) << TAG_BITS),
+            )
+
+
+@kernel
+def _between(a, b, c, d, u, v):
+    """Between four corners."""
+    return (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v
 
 
 @kernel
@@ -290,7 +306,9 @@ def _stroke(x, y, yaw, half_length, half_width, origin, paint, level):
             r = np.float64(old & np.uint32(255))
             g = np.float64((old >> np.uint32(8)) & np.uint32(255))
             b = np.float64((old >> np.uint32(16)) & np.uint32(255))
-            last = np.uint32(24) if cover > 0.4 else (old >> np.uint32(24))
+            last = old >> np.uint32(24)
+            if cover > 0.4:
+                last = (last & np.uint32(224)) | np.uint32(24)
             level[row, column] = _pack(
                 r + max(0.0, cover * (paint[0] - r)),
                 g + max(0.0, cover * (paint[1] - g)),
@@ -318,7 +336,7 @@ def _draw_lines(lanes, chosen, origin, paints, level):
             if not broken or lanes.road_m[p] % DASH_EVERY_M < DASH_M:
                 _line_piece(lanes, p, 1.0, 0.0 if right else LINE_INSET_M, origin, paints[0], level)
             if lanes.left[lane] < 0:
-                _line_piece(lanes, p, -1.0, LINE_INSET_M, origin, paints[1], level)
+                _line_piece(lanes, p, -1.0, MIDDLE_INSET_M, origin, paints[1], level)
 
 
 @kernel

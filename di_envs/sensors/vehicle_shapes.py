@@ -33,7 +33,7 @@ _BODIES = np.array(
         (0.42, 0.43, 0.45),
         (0.13, 0.13, 0.14),
         (0.55, 0.09, 0.08),
-        (0.10, 0.17, 0.42),
+        (0.14, 0.24, 0.52),
         (0.16, 0.33, 0.24),
         (0.66, 0.56, 0.36),
     ],
@@ -76,14 +76,14 @@ def _lights(tail_z: float, size: float) -> list[tuple[float, ...]]:
 
 
 # (part, centre along, across, up, half length, half width, half height, small); up from the ground
-_CAR = [
+_CAR: list[tuple[float, ...]] = [
     (BODY, 0, 0, 0.39, 1, 1, 0.25, 0),
     (GLASS, -0.10, 0, 0.78, 0.58, 0.86, 0.16, 0),
     (BODY, -0.12, 0, 0.965, 0.46, 0.82, 0.035, 0),
     *_wheels(0.62, 0.14, 0.21),
     *_lights(0.52, 0.05),
 ]
-_VAN = [
+_VAN: list[tuple[float, ...]] = [
     (BODY, 0, 0, 0.36, 1, 1, 0.24, 0),
     (GLASS, 0.02, 0, 0.70, 0.90, 0.94, 0.12, 0),
     (BODY, -0.06, 0, 0.76, 0.90, 0.93, 0.24, 0),
@@ -91,7 +91,7 @@ _VAN = [
     *_wheels(0.62, 0.12, 0.14),
     *_lights(0.42, 0.05),
 ]
-_TRUCK = [
+_TRUCK: list[tuple[float, ...]] = [
     (BODY, 0.72, 0, 0.42, 0.28, 0.96, 0.32, 0),
     (GLASS, 0.90, 0, 0.60, 0.105, 0.90, 0.11, 0),
     (TRIM, -0.05, 0, 0.22, 0.95, 0.80, 0.08, 0),
@@ -99,14 +99,14 @@ _TRUCK = [
     *_wheels(0.66, 0.14, 0.16),
     *_lights(0.30, 0.03),
 ]
-_BUS = [
+_BUS: list[tuple[float, ...]] = [
     (BODY, 0, 0, 0.53, 1, 1, 0.42, 0),
-    (GLASS, 0.01, 0, 0.66, 1.005, 1.005, 0.14, 0),
+    (GLASS, 0, 0, 0.66, 1.004, 1.01, 0.14, 0),
     (TRIM, 0, 0, 0.97, 0.96, 0.94, 0.03, 0),
     *_wheels(0.62, 0.11, 0.15),
     *_lights(0.34, 0.03),
 ]
-_MOTORCYCLE = [
+_MOTORCYCLE: list[tuple[float, ...]] = [
     (BODY, 0, 0, 0.36, 0.55, 0.35, 0.14, 0),
     (TYRE, 0.68, 0, 0.20, 0.30, 0.14, 0.20, 0),
     (TYRE, -0.68, 0, 0.20, 0.30, 0.16, 0.20, 0),
@@ -116,7 +116,7 @@ _MOTORCYCLE = [
     (GLASS, -0.06, 0, 0.92, 0.12, 0.30, 0.08, 0),
     (TAIL, -0.80, 0, 0.42, 0.02, 0.22, 0.04, 0),
 ]
-_BICYCLE = [
+_BICYCLE: list[tuple[float, ...]] = [
     (BODY, 0, 0, 0.32, 0.5, 0.08, 0.10, 0),
     (TYRE, 0.62, 0, 0.19, 0.36, 0.06, 0.19, 0),
     (TYRE, -0.62, 0, 0.19, 0.36, 0.06, 0.19, 0),
@@ -124,14 +124,14 @@ _BICYCLE = [
     (BODY, -0.10, 0, 0.70, 0.15, 0.62, 0.15, 0),
     (SKIN, -0.04, 0, 0.93, 0.11, 0.32, 0.07, 0),
 ]
-_WALKER = [
+_WALKER: list[tuple[float, ...]] = [
     (TROUSERS, 0, -0.38, 0.23, 0.42, 0.30, 0.23, 0),
     (TROUSERS, 0, 0.38, 0.23, 0.42, 0.30, 0.23, 0),
     (BODY, 0, 0, 0.645, 0.50, 0.95, 0.20, 0),
     (SKIN, 0.05, 0, 0.925, 0.42, 0.42, 0.075, 0),
 ]
-_POLE = [(TRIM, 0, 0, 0.5, 0.55, 0.55, 0.5, 0)]
-_BY_KIND = {
+_POLE: list[tuple[float, ...]] = [(TRIM, 0, 0, 0.5, 0.55, 0.55, 0.5, 0)]
+_BY_KIND: dict[ActorKind, tuple[list[tuple[float, ...]], Tag]] = {
     ActorKind.CAR: (_CAR, Tag.CAR),
     ActorKind.VAN: (_VAN, Tag.CAR),
     ActorKind.TRUCK: (_TRUCK, Tag.TRUCK),

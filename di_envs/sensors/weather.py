@@ -124,10 +124,10 @@ def look_of(weather: Weather) -> Look:
     )
     low = max(0.0, 1.0 - weather.sun_altitude_deg / 40.0) if not night else 0.0  # sunset, 0..1
     clear_sun = np.array([1.0, 0.96 - 0.24 * low, 0.88 - 0.48 * low])
-    direct = (1.0 - 0.82 * cloud) * (0.95 - 0.1 * low)
-    shade = np.array([0.40, 0.43, 0.48]) * (1.0 + 0.30 * cloud) * (1.0 - 0.28 * low)
+    direct = (1.0 - 0.85 * cloud) * (0.85 + 0.35 * low)
+    shade = np.array([0.50, 0.53, 0.58]) * (1.0 + 0.35 * cloud) * (1.0 - 0.15 * low)
     grey = np.array([0.66, 0.68, 0.71]) * (1.0 - 0.28 * low - 0.22 * rain)
-    zenith = _mix(np.array([0.24, 0.44, 0.76]) * (1.0 - 0.35 * low), grey * 0.92, cloud)
+    zenith = _mix(np.array([0.27, 0.47, 0.77]) * (1.0 - 0.35 * low), grey * 0.92, cloud)
     bright = _mix(np.array([0.76, 0.84, 0.92]), np.array([0.96, 0.68, 0.45]), low)
     horizon = _mix(bright, grey * np.array([1.05, 1.03, 1.0]), 0.9 * cloud)
     shade = shade * (1.0 - 0.20 * rain)
@@ -138,7 +138,7 @@ def look_of(weather: Weather) -> Look:
         shade = shade * _mix(np.ones(3), np.array([1.0, 0.85, 0.62]), share)
     if night:
         direct = 0.04
-        shade = np.array([0.15, 0.155, 0.19]) * (1.0 - 0.2 * cloud)
+        shade = np.array([0.15, 0.15, 0.17]) * (1.0 - 0.2 * cloud)
         zenith = np.array([0.012, 0.018, 0.045]) + 0.02 * cloud
         horizon = np.array([0.055, 0.060, 0.085]) + 0.02 * cloud
     haze = 1.0 / 700.0 + rain / 260.0 + weather.dust / 100.0 / 45.0
@@ -151,7 +151,7 @@ def look_of(weather: Weather) -> Look:
         rain,
         float(night),
         cloud,
-        0.8 if night else 0.0,
+        0.6 if night else 0.0,
     )
     return Look(
         sun=np.array(sun, np.float32),
