@@ -86,4 +86,7 @@ def test_numbers_of_streams_are_part_of_every_seed_and_stay():
         "AGENT": 10,
         "WEATHER": 11,
         "ROUTE": 12,
+        "VEHICLE_COLOUR": 13,
+        "SCENERY": 14,
+        "RAIN": 15,
     }

@@ -56,7 +56,7 @@ from di_envs.world.world import WorldView
 
 FAR_M = 1000.0  # depth of the sky
 RANGE_M = 220.0  # boxes further from the ego are not seen
-_TAPS = 4  # samples along the road for a row that is far longer than wide
+_TAPS = 3  # samples along the road for a row that is far longer than wide
 _PLAIN, _WINDOWS, _DECK = int(Material.PLAIN), int(Material.WINDOWS), int(Material.DECK)
 _FOLIAGE, _LAMP = int(Material.FOLIAGE), int(Material.LAMP)
 _SKY = int(Tag.SKY)
@@ -232,7 +232,7 @@ def _texture(canvas, raster, a, b, y, over, with_last):
     flat_m = math.hypot(gx, gy)
     wide = middle / focal
     long = wide * max(1.0, middle * flat_m / over)
-    taps = int(min(max(math.floor(long / wide * 0.6), 1.0), _TAPS * 1.0))
+    taps = int(min(max(math.floor(long / wide * 0.5), 1.0), _TAPS * 1.0))
     level = _level(max(wide, long / taps))
     stride = 1
     while stride < 8 and wide * stride * 3.0 <= TEXEL_M * (1 << level):

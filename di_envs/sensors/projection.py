@@ -15,7 +15,7 @@ from di_envs.sensors.boxes import Material
 from di_envs.sensors.scene import ROOM
 
 NEAR = 0.1  # m; nothing nearer is seen
-SMALLEST_PX = 0.35  # boxes that look smaller are left out, unless they shine
+SMALLEST_PX = 0.7  # boxes that look smaller are left out, unless they shine
 SHADOW_RANGE_M = 90.0
 _LAMP = int(Material.LAMP)
 
