@@ -2,6 +2,7 @@
 
 `images/town05.png` is a moment of a drive in the shipped town: the whole of it and the streets
 around the ego. `images/prompt.png` is what an agent is told at that moment, in the ego frame.
+`images/view.png` is that moment as `render_mode="rgb_array"` shows it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 from numpy.typing import NDArray
+from PIL import Image
 
 from agents import load_agent
 from di_envs.drawing import (
@@ -308,8 +310,18 @@ def _draw_obstacles(axes: Axes, obstacles: NDArray[np.float32]) -> None:
             axes.arrow(y, x, vy, vx, head_width=0.9, color="#333333", linewidth=0.7, zorder=4)
 
 
+def view_picture(env: RouteEnv) -> NDArray[np.uint8]:
+    """The view for people of the same moment, with the front camera."""
+    filmed = RouteEnv(
+        suite="town05_long", observations=("prompt", "camera"), render_mode="rgb_array"
+    )
+    filmed.restore_state(env.save_state())
+    picture: NDArray[np.uint8] = filmed.render()
+    return picture
+
+
 def main() -> None:
-    """Draws both pictures."""
+    """Draws the pictures."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -329,6 +341,8 @@ def main() -> None:
         figure.savefig(arguments.output / name, bbox_inches="tight", pad_inches=0.08)
         plt.close(figure)
         print(f"written: {arguments.output / name}")
+    Image.fromarray(view_picture(env)).save(arguments.output / "view.png", optimize=True)
+    print(f"written: {arguments.output / 'view.png'}")
 
 
 if __name__ == "__main__":
