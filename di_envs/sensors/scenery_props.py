@@ -22,7 +22,7 @@ from di_envs.sensors.tags import Tag
 from di_envs.town.lanes import LaneKind
 from di_envs.town.town import Town
 
-SLAB_M = 6.0  # length of a deck's pieces
+SLAB_M = 10.0  # length of a deck's pieces
 DECK_THICKNESS_M = 1.3
 EMBANKMENT_M = 4.0  # decks lower than this stand on earth
 PILLAR_EVERY_M = 24.0
