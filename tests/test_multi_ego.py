@@ -141,6 +141,21 @@ def test_an_ego_sees_the_other_as_a_car_where_it_is():
     assert (seen[7], seen[8]) == (ActorKind.CAR, 1.0)
 
 
+def test_an_egos_front_camera_shows_the_other_ahead_of_it():
+    """Two egos on one road, then the leader off the road: only the follower's picture changes."""
+    env = one_behind_the_other(10, observations=("camera",))
+    before = env._observe()
+    env.world.remove_ego(1)
+    after = env._observe()["ego_0"]
+    changed = (before["ego_0"]["camera_front"] != after["camera_front"]).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    assert changed.sum() > 50
+    height, width = changed.shape
+    assert abs(np.median(columns) - width / 2) < 0.1 * width
+    assert np.median(rows) > 0.4 * height
+    assert not np.array_equal(before["ego_0"]["camera_front"], before["ego_1"]["camera_front"])
+
+
 def test_an_ego_that_runs_into_another_counts_a_collision_for_both():
     env = one_behind_the_other(15)
     met = {name: [] for name in env.agents}

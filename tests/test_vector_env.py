@@ -62,6 +62,20 @@ def test_two_hundred_steps_are_those_of_single_environments(mode, threads):
     theirs.close()
 
 
+def test_cameras_in_threads_see_what_those_of_single_environments_see():
+    ours, theirs = make_pair(AutoresetMode.NEXT_STEP, 2, observations=("camera", "inertial"))
+    assert data_equivalence(ours.reset(seed=4), theirs.reset(seed=4), exact=True)
+    for _ in range(12):
+        step = ours.step(ACTIONS)
+        assert data_equivalence(step, theirs.step(ACTIONS), exact=True)
+    front = step[0]["camera_front"]
+    assert front.dtype == np.uint8
+    assert front.shape[0] == N
+    assert not np.array_equal(front[0], front[1])
+    ours.close()
+    theirs.close()
+
+
 def test_without_autoreset_the_caller_resets_those_of_a_mask():
     ours, theirs = make_pair(AutoresetMode.DISABLED, 2)
     ours.reset(seed=[5, 6, 7])
