@@ -162,7 +162,7 @@ class GifWriter:
         if self._seen % self._every == 0:
             height = round(frame.shape[0] * GIF_WIDTH_PX / frame.shape[1])
             small = Image.fromarray(frame).resize((GIF_WIDTH_PX, height))
-            self._frames.append(small.quantize(128, dither=Image.Dither.NONE))
+            self._frames.append(small.quantize(128, Image.Quantize.FASTOCTREE))
         self._seen += 1
 
     def __enter__(self) -> Self:
