@@ -76,13 +76,17 @@ class Course:
 
     def observation_space(self) -> spaces.Dict:
         """The space of what an ego sees."""
-        return observation_space(self.config.observations, self.config.cameras)
+        return observation_space(self.config.observations, self.config.cameras, self.config.lidar)
 
     def observer(self) -> Observer:
         """Looks at a world through the first ego's eyes; `of_ego` makes those of others."""
         config = self.config
         return Observer(
-            self.town, config.observations, cameras=config.cameras, weather=config.weather
+            self.town,
+            config.observations,
+            cameras=config.cameras,
+            lidar=config.lidar,
+            weather=config.weather,
         )
 
     def ending(

@@ -36,6 +36,8 @@ from di_envs.prompt import (
 from di_envs.sensors.camera import FAR_M, CameraRig
 from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
+from di_envs.sensors.lidar import Lidar
+from di_envs.sensors.lidar_config import LidarConfig, lidar_of
 from di_envs.sensors.tags import Tag
 from di_envs.sensors.weather import weather_of
 from di_envs.town.lanes import LightState
@@ -68,7 +70,9 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
 }
 
 
-def observation_space(groups: tuple[str, ...], cameras: str | Rig = "small") -> spaces.Dict:
+def observation_space(
+    groups: tuple[str, ...], cameras: str | Rig = "small", lidar: str | LidarConfig = "paper"
+) -> spaces.Dict:
     """The space of the groups asked for.
 
     Group `prompt`: `command` (RoadOption at the next target point, 0 for none), `target_point`
@@ -85,6 +89,9 @@ def observation_space(groups: tuple[str, ...], cameras: str | Rig = "small") -> 
 
     Group `camera`: for each camera of the rig `cameras` its RGB image (H, W, 3) under its name, and
     what else the rig asks for (see `Rig`).
+
+    Group `lidar`: `lidar` (rays, 4) x, y, z in the ego's frame [m] and intensity of each ray's hit,
+    zeros for rays that hit nothing or were dropped; and what else is asked for (see `LidarConfig`).
     """
     space: dict[str, spaces.Space[Any]] = {}
     if "prompt" in groups:
@@ -98,7 +105,20 @@ def observation_space(groups: tuple[str, ...], cameras: str | Rig = "small") -> 
         )
     if "camera" in groups:
         space.update(_image_spaces(rig_of(cameras)))
+    if "lidar" in groups:
+        space.update(_lidar_spaces(lidar_of(lidar)))
     return spaces.Dict(space)
+
+
+def _lidar_spaces(config: LidarConfig) -> dict[str, spaces.Space[Any]]:
+    far = np.float32(config.reach_m)
+    high = np.tile(np.array([far, far, far, 1.0], np.float32), (config.rays, 1))
+    low = -high
+    low[:, 3] = 0.0
+    points: dict[str, spaces.Space[Any]] = {"lidar": spaces.Box(low, high, dtype=np.float32)}
+    if config.semantic:
+        points["lidar_semantic"] = spaces.Box(0, max(Tag), (config.rays,), np.uint8)
+    return points
 
 
 def _image_spaces(rig: Rig) -> dict[str, spaces.Space[Any]]:
@@ -157,6 +177,7 @@ class Observer:
         ego: int = 0,
         *,
         cameras: str | Rig = "small",
+        lidar: str | LidarConfig = "paper",
         weather: str | None = None,
     ) -> None:
         """Prepares to look.
@@ -166,10 +187,12 @@ class Observer:
             groups: Groups of observations.
             ego: Index of the ego that looks.
             cameras: Its rig, or the name of a shipped one; for group `camera`.
+            lidar: Its LiDAR, or the name of a shipped one; for group `lidar`.
             weather: What cameras see, one of CARLA's presets; None for ClearNoon.
         """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
         self._rig = rig_of(cameras) if "camera" in groups else None
+        self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
         self._weather = weather_of(weather or "ClearNoon")
         self._ego, self._town = ego, town
         self._stop_lines = stop_lines_of(town.signals)
@@ -201,6 +224,10 @@ class Observer:
         if self._rig is not None:
             self._cameras = CameraRig(self._town, self._rig, self._weather, self._ego)
             self._cameras.start(view)
+        self._lidar: Lidar | None = None
+        if self._lidar_config is not None:
+            self._lidar = Lidar(self._town, self._lidar_config, self._ego)
+            self._lidar.start(view)
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
@@ -218,4 +245,6 @@ class Observer:
             observation["gnss"] = sight.gnss.copy()
         if self._cameras is not None:
             observation.update(self._cameras.observe())
+        if self._lidar is not None:
+            observation.update(self._lidar.observe())
         return observation

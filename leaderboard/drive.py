@@ -75,7 +75,7 @@ def drive(
                 film.add(env.render())
 
         groups = _groups(spec, scene.requires)
-        keys = observation_space(groups, env.config.cameras).keys()
+        keys = observation_space(groups, env.config.cameras, env.config.lidar).keys()
         watched = Watched(env, watch, keys)
         return drive_route(watched, lambda: load_agent(spec.agent), job, rules_named(spec.rules))
 

@@ -108,7 +108,8 @@ def test_an_unknown_option_is_refused_with_a_suggestion():
     [
         ({}, "needs suite=NAME, or both town=FILE and routes=FILE"),
         ({"town": "x.xodr"}, "needs suite=NAME"),
-        ({"suite": "toy", "observations": ("lidar", "prompt")}, "'lidar' is not available yet"),
+        ({"suite": "toy", "observations": ("lidra",)}, "did you mean 'lidar'"),
+        ({"suite": "toy", "lidar": "dnse"}, "did you mean 'dense'"),
         ({"suite": "toy", "observations": ("promt",)}, "did you mean 'prompt'"),
         ({"suite": "toy", "observations": "prompt"}, r"Try \('prompt',\)"),
         ({"suite": "toy", "observations": ()}, "observations is empty"),
