@@ -449,7 +449,8 @@ class CameraRig:
             boxes=self._boxes,
             seen=self._seen,
         )
-        canvas = _canvas(self.rig.cameras[0], self.rig)
+        self._canvases = [_canvas(camera, self.rig) for camera in self.rig.cameras]
+        canvas = self._canvases[0]
         self._collect = bind(
             collect_boxes, self._scene, view.state, self._ego, RANGE_M, self._boxes
         )
@@ -460,7 +461,7 @@ class CameraRig:
         self._collect(self._scene, self._studio.state, self._ego, RANGE_M, self._boxes)
         images: dict[str, NDArray[Any]] = {}
         for number, camera in enumerate(self.rig.cameras):
-            canvas = _canvas(camera, self.rig)
+            canvas = self._fresh(self._canvases[number])
             self._render(self._studio, canvas, self._ego, number)
             images[camera.name] = canvas.rgb.reshape(camera.height, camera.width, 3)
             if self.rig.depth:
@@ -470,6 +471,17 @@ class CameraRig:
             if self.rig.instance:
                 images[f"{camera.name}_instance"] = canvas.instance
         return images
+
+    def _fresh(self, canvas: Canvas) -> Canvas:
+        """The canvas with new arrays for what is handed out; the rest is used again and again."""
+        images: dict[str, NDArray[Any]] = {"rgb": np.empty_like(canvas.rgb)}
+        if self.rig.depth:
+            images["depth"] = np.empty_like(canvas.depth)
+        if self.rig.semantic:
+            images["tag"] = np.empty_like(canvas.tag)
+        if self.rig.instance:
+            images["instance"] = np.empty_like(canvas.instance)
+        return canvas._replace(**images)
 
 
 def _canvas(camera: CameraConfig, rig: Rig) -> Canvas:
