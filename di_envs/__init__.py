@@ -26,16 +26,34 @@ ENVIRONMENTS = {
 }
 
 # Loaded when first asked for, as they bring Numba with them.
-_LAZY = {"RouteEnv": "di_envs.route_env"}
+_LAZY = {
+    "MultiEgoEnv": "di_envs.multi_ego",
+    "RouteEnv": "di_envs.route_env",
+    "RouteVectorEnv": "di_envs.vector_env",
+    "parallel_env": "di_envs.multi_ego",
+}
 
-__all__ = ["ENVIRONMENTS", "EnvSnapshot", "RouteEnv", "RouteEnvConfig", "restore", "save"]
+__all__ = [
+    "ENVIRONMENTS",
+    "EnvSnapshot",
+    "MultiEgoEnv",
+    "RouteEnv",
+    "RouteEnvConfig",
+    "RouteVectorEnv",
+    "parallel_env",
+    "restore",
+    "save",
+]
 
 
 def _register() -> None:
     for env_id, config in ENVIRONMENTS.items():
         if env_id not in gymnasium.registry:
             gymnasium.register(
-                env_id, entry_point="di_envs.route_env:RouteEnv", kwargs=config.changes()
+                env_id,
+                entry_point="di_envs.route_env:RouteEnv",
+                vector_entry_point="di_envs.vector_env:RouteVectorEnv",
+                kwargs=config.changes(),
             )
 
 

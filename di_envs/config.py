@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from di_envs.sensors.camera_config import Rig, rig_of
+from di_envs.sensors.lidar_config import LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
 
-OBSERVATION_GROUPS = ("prompt", "inertial")  # what can be asked for now
-LATER_GROUPS = ("camera", "lidar")  # named in the design, not rendered yet
+OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar")
 EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
 RULES = ("carla-1.0",)
 
@@ -69,10 +70,14 @@ class RouteEnvConfig:
         routes: Path of a route file in CARLA's XML.
         route_ids: Ids of the routes to use; None for all.
         signals: Sidecar file or shipped name of a town's signals, or `synthesise`.
-        observations: Groups of observations: `prompt`, `inertial` (`camera`, `lidar` come later).
+        observations: Groups of observations: `prompt`, `inertial`, `camera`, `lidar`.
         traffic: Number of other vehicles.
         walkers: Number of walkers.
         weather: Name of one of CARLA's weather presets; seen by cameras only.
+        cameras: Name of a rig, `small` (4 x 256 x 144), `paper` (4 x 1600 x 900) or `rl` (one of
+            84 x 84), or a `Rig` of one's own; for the group `camera`.
+        lidar: Name of a LiDAR, `paper` (32 x 175 rays), `leaderboard` (64 x 937) or `dense`
+            (32 x 1800), or a `LidarConfig` of one's own; for the group `lidar`.
         control_dt_s: Time for which an action is held, a multiple of the world tick of 0.05 s.
         rules: Name of the scoring rules; their penalties make the reward.
         terminate_on: Events that end the episode besides those by which the rules do, such as
@@ -88,6 +93,8 @@ class RouteEnvConfig:
     traffic: int | None = None
     walkers: int | None = None
     weather: str | None = None
+    cameras: str | Rig = "small"
+    lidar: str | LidarConfig = "paper"
     control_dt_s: float = 0.1
     rules: str = "carla-1.0"
     terminate_on: tuple[str, ...] = ()
@@ -124,17 +131,14 @@ class RouteEnvConfig:
         if not self.observations:
             raise ValueError(f"observations is empty; known: {', '.join(OBSERVATION_GROUPS)}.")
         for group in self.observations:
-            if group in LATER_GROUPS:
-                raise ValueError(
-                    f"Observation group '{group}' is not available yet; available: "
-                    f"{', '.join(OBSERVATION_GROUPS)}."
-                )
             check_name(group, OBSERVATION_GROUPS, "observation group")
         for event in self.terminate_on:
             check_name(event, EVENT_NAMES, "event in terminate_on")
         if self.weather is not None:
             check_name(self.weather, WEATHERS, "weather")
         check_name(self.rules, RULES, "rules")
+        rig_of(self.cameras)
+        lidar_of(self.lidar)
 
     @property
     def control_ticks(self) -> int:

@@ -31,10 +31,16 @@ class Stream(IntEnum):
     AGENT = 10
     WEATHER = 11
     ROUTE = 12
+    VEHICLE_COLOUR = 13
+    SCENERY = 14  # of a town, the same in every episode
+    RAIN = 15
+    LIDAR = 16  # which rays are dropped
+    LIDAR_NOISE = 17
 
 
 @kernel
-def _mix(value):
+def mix(value):
+    """Scrambles 64 bits."""
     value = np.uint64(value) + np.uint64(0x9E3779B97F4A7C15)
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -42,12 +48,17 @@ def _mix(value):
 
 
 @kernel
+def keyed_part(seed, stream, tick):
+    """What many draws share: `keyed_hash(seed, stream, tick, actor)` is `mix(part ^ actor)`."""
+    value = mix(np.uint64(seed))
+    value = mix(value ^ np.uint64(stream))
+    return mix(value ^ np.uint64(tick))
+
+
+@kernel
 def keyed_hash(seed, stream, tick, actor):
     """Hashes four integers to 64 bits."""
-    value = _mix(np.uint64(seed))
-    value = _mix(value ^ np.uint64(stream))
-    value = _mix(value ^ np.uint64(tick))
-    return _mix(value ^ np.uint64(actor))
+    return mix(keyed_part(seed, stream, tick) ^ np.uint64(actor))
 
 
 @kernel

@@ -6,6 +6,7 @@ ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to 
 
 from __future__ import annotations
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,13 @@ from di_envs.prompt import (
     prompt_route_of,
     stop_lines_of,
 )
+from di_envs.sensors.camera import FAR_M, CameraRig
+from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
+from di_envs.sensors.lidar import Lidar
+from di_envs.sensors.lidar_config import LidarConfig, lidar_of
+from di_envs.sensors.tags import Tag
+from di_envs.sensors.weather import weather_of
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
@@ -63,7 +70,9 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
 }
 
 
-def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
+def observation_space(
+    groups: tuple[str, ...], cameras: str | Rig = "small", lidar: str | LidarConfig = "paper"
+) -> spaces.Dict:
     """The space of the groups asked for.
 
     Group `prompt`: `command` (RoadOption at the next target point, 0 for none), `target_point`
@@ -77,6 +86,12 @@ def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
 
     Group `inertial`: `imu` (ax, ay, az [m/s2], gx, gy, gz [rad/s], compass [rad]) and `gnss`
     (latitude, longitude [deg], altitude [m]; double precision, as a single one is 0.4 m coarse).
+
+    Group `camera`: for each camera of the rig `cameras` its RGB image (H, W, 3) under its name, and
+    what else the rig asks for (see `Rig`).
+
+    Group `lidar`: `lidar` (rays, 4) x, y, z in the ego's frame [m] and intensity of each ray's hit,
+    zeros for rays that hit nothing or were dropped; and what else is asked for (see `LidarConfig`).
     """
     space: dict[str, spaces.Space[Any]] = {}
     if "prompt" in groups:
@@ -88,7 +103,37 @@ def observation_space(groups: tuple[str, ...]) -> spaces.Dict:
         space["gnss"] = spaces.Box(
             np.array([-90.0, -180.0, -1e4]), np.array([90.0, 180.0, 1e4]), dtype=np.float64
         )
+    if "camera" in groups:
+        space.update(_image_spaces(rig_of(cameras)))
+    if "lidar" in groups:
+        space.update(_lidar_spaces(lidar_of(lidar)))
     return spaces.Dict(space)
+
+
+def _lidar_spaces(config: LidarConfig) -> dict[str, spaces.Space[Any]]:
+    far = np.float32(config.reach_m)
+    high = np.tile(np.array([far, far, far, 1.0], np.float32), (config.rays, 1))
+    low = -high
+    low[:, 3] = 0.0
+    points: dict[str, spaces.Space[Any]] = {"lidar": spaces.Box(low, high, dtype=np.float32)}
+    if config.semantic:
+        points["lidar_semantic"] = spaces.Box(0, max(Tag), (config.rays,), np.uint8)
+    return points
+
+
+def _image_spaces(rig: Rig) -> dict[str, spaces.Space[Any]]:
+    images: dict[str, spaces.Space[Any]] = {}
+    for camera in rig.cameras:
+        size = (camera.height, camera.width)
+        images[camera.name] = spaces.Box(0, 255, (*size, 3), np.uint8)
+        if rig.depth:
+            images[f"{camera.name}_depth"] = spaces.Box(0.0, FAR_M, size, np.float32)
+        if rig.semantic:
+            images[f"{camera.name}_semantic"] = spaces.Box(0, max(Tag), size, np.uint8)
+        if rig.instance:
+            most = int(np.iinfo(np.int32).max)
+            images[f"{camera.name}_instance"] = spaces.Box(0, most, size, np.int32)
+    return images
 
 
 def _table(name: str) -> spaces.Box:
@@ -125,12 +170,40 @@ def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no
 class Observer:
     """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables."""
 
-    def __init__(self, town: Town, groups: tuple[str, ...], ego: int = 0) -> None:
+    def __init__(
+        self,
+        town: Town,
+        groups: tuple[str, ...],
+        ego: int = 0,
+        *,
+        cameras: str | Rig = "small",
+        lidar: str | LidarConfig = "paper",
+        weather: str | None = None,
+    ) -> None:
+        """Prepares to look.
+
+        Args:
+            town: The town.
+            groups: Groups of observations.
+            ego: Index of the ego that looks.
+            cameras: Its rig, or the name of a shipped one; for group `camera`.
+            lidar: Its LiDAR, or the name of a shipped one; for group `lidar`.
+            weather: What cameras see, one of CARLA's presets; None for ClearNoon.
+        """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
-        self._ego = ego
+        self._rig = rig_of(cameras) if "camera" in groups else None
+        self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
+        self._weather = weather_of(weather or "ClearNoon")
+        self._ego, self._town = ego, town
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
         self._geo_origin = np.array(town.geo_origin, np.float64)
+
+    def of_ego(self, ego: int) -> Observer:
+        """Another observer, of that ego: it shares the static tables, `start` makes its buffers."""
+        other = copy.copy(self)
+        other._ego = ego
+        return other
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""
@@ -147,6 +220,14 @@ class Observer:
         self._fill = bind(
             fill_observation, self._sight, self._ego, self._with_prompt, self._with_inertial
         )
+        self._cameras: CameraRig | None = None
+        if self._rig is not None:
+            self._cameras = CameraRig(self._town, self._rig, self._weather, self._ego)
+            self._cameras.start(view)
+        self._lidar: Lidar | None = None
+        if self._lidar_config is not None:
+            self._lidar = Lidar(self._town, self._lidar_config, self._ego)
+            self._lidar.start(view)
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
@@ -162,4 +243,8 @@ class Observer:
         if self._with_inertial:
             observation["imu"] = sight.imu.copy()
             observation["gnss"] = sight.gnss.copy()
+        if self._cameras is not None:
+            observation.update(self._cameras.observe())
+        if self._lidar is not None:
+            observation.update(self._lidar.observe())
         return observation

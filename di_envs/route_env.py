@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
 
 from di_envs.actions import action_space, checked_action
-from di_envs.config import RouteEnvConfig, check_name
+from di_envs.config import check_name
+from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
-from di_envs.observation import Observer, observation_space
-from di_envs.reward import (
-    PENALTIES,
-    Standing,
-    infraction_penalty,
-    reward_terms,
-    score_metres,
-    standing_of,
-)
-from di_envs.suites import choose_suite
-from di_envs.town.loading import load_town
+from di_envs.reward import standing_of
+from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
-from di_envs.world.state import TICK_S, EventKind
-from di_envs.world.world import Event, Snapshot, World, WorldConfig, WorldView
+from di_envs.world.world import Snapshot, World, WorldView
 
 Observation = dict[str, Any]
 Info = dict[str, Any]
@@ -67,45 +58,42 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         plans: The routes that there are to drive, in the order of `route_ids`.
     """
 
-    metadata = {"render_modes": [], "render_fps": 20}  # noqa: RUF012 (Gymnasium's own contract)
+    metadata = {  # noqa: RUF012 (Gymnasium's own contract)
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
 
-    def __init__(self, *, render_mode: None = None, **options: Any) -> None:
+    def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
         """Loads the town and plans the routes.
 
         Args:
-            render_mode: None; there is no renderer yet.
+            render_mode: `rgb_array`: `render` returns a picture for people, see
+                `di_envs.render`. `human`: a window shows it after each reset and step. None: no
+                pictures.
             options: See `RouteEnvConfig`.
 
         Raises:
             ValueError: If an option is unknown or refused, or a route cannot be planned.
             FileNotFoundError: If there is no such town.
+            RuntimeError: If there is no display for `human`.
         """
-        if render_mode is not None:
-            raise ValueError(f"RouteEnv has no render mode yet; got render_mode={render_mode!r}.")
-        config = RouteEnvConfig.from_mapping(options)
-        suite = choose_suite(
-            config.suite, town=config.town, routes=config.routes, signals=config.signals
-        )
-        vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
-        walkers = suite.traffic.walkers if config.walkers is None else config.walkers
-        self.config = dataclasses.replace(
-            config, traffic=vehicles, walkers=walkers, weather=config.weather or suite.weather
-        )
-        town = load_town(suite.town_path, suite.signals)
-        self.plans = suite.plans(town, config.route_ids)
-        self.world = World(town, WorldConfig(vehicles=vehicles, walkers=walkers))
-        self.observation_space = observation_space(config.observations)
+        check_render_mode(render_mode)
+        self._course = course = load_course(options)
+        self.config, self.plans = course.config, course.plans
+        self.world = World(course.town, course.world_config)
+        self.observation_space = course.observation_space()
         self.action_space = action_space()
-        self._observer = Observer(town, config.observations, _EGO)
-        self._penalties = PENALTIES[config.rules]
-        self._stops = tuple(EventKind[name.upper()] for name in config.terminate_on)
+        self._observer = course.observer()
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
+        self._screen = None if render_mode is None else Screen(course, render_mode)
         self._begun = False
         self._over = True
 
     @property
     def route_ids(self) -> tuple[str, ...]:
         """Ids of the routes, by index."""
-        return tuple(plan.route_id for plan in self.plans)
+        return self._course.route_ids
 
     @property
     def view(self) -> WorldView:
@@ -141,7 +129,11 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._begun, self._over = True, False
         self._observer.start(self.view)
         standing = standing_of(self.view.state, _EGO)
-        return self._observer.observe(), self._info(standing, standing, ())
+        info = self._course.info(self.view, _EGO, standing, standing, ())
+        observation = self._observer.observe()
+        if self.render_mode == "human":
+            self._draw(observation)
+        return observation, info
 
     def step(self, action: np.ndarray[Any, Any]) -> tuple[Observation, float, bool, bool, Info]:
         """Holds an action for `control_dt_s`.
@@ -158,15 +150,35 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             raise gymnasium.error.ResetNeeded(
                 "There is no episode to step: it is over, or none was begun. Call reset() first."
             )
-        state = self.view.state
-        before = standing_of(state, _EGO)
+        view, course = self.view, self._course
+        before = standing_of(view.state, _EGO)
         events = tuple(self.world.advance(control[None], self.config.control_ticks))
-        after = standing_of(state, _EGO)
-        terminated, truncated = self._ending(before, after)
+        after = standing_of(view.state, _EGO)
+        terminated, truncated = course.ending(view, _EGO, before, after)
         self._over = terminated or truncated
-        info = self._info(before, after, events)
+        info = course.info(view, _EGO, before, after, events)
         reward = sum(info["reward_terms"].values())
-        return self._observer.observe(), reward, terminated, truncated, info
+        observation = self._observer.observe()
+        if self.render_mode == "human":
+            self._draw(observation)
+        return observation, reward, terminated, truncated, info
+
+    def render(self) -> Any:
+        """A picture of the present state, (H, W, 3) uint8; None unless the mode is `rgb_array`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset.
+        """
+        if not self._begun:
+            raise gymnasium.error.ResetNeeded("There is nothing to see yet. Call reset() first.")
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing: make it with render_mode='rgb_array'.")
+        return self._draw(self._observer.observe()) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._screen is not None:
+            self._screen.close()
 
     def observe(self) -> Observation:
         """The present observation once more: after `restore`, for instance. Changes nothing."""
@@ -195,41 +207,28 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self.np_random.bit_generator.state = dict(snapshot.np_random)
         self._np_random_seed = snapshot.np_random_seed
 
+    def twin(self) -> Self:
+        """Another environment like this one, not begun; it shares the town, routes and tables.
+
+        What is shared never changes, so twins may be stepped in threads of their own.
+        """
+        twin = copy.copy(self)
+        twin.world = self.world.twin()
+        twin.observation_space = copy.deepcopy(self.observation_space)
+        twin.action_space = copy.deepcopy(self.action_space)
+        twin._observer = self._observer.of_ego(_EGO)
+        twin._begun, twin._over = False, True
+        twin._np_random, twin._np_random_seed = None, None
+        return twin
+
+    def _draw(self, observation: Observation) -> Any:
+        """Shows the present state in the window, or returns the picture."""
+        assert self._screen is not None
+        return self._screen.draw(self.view, _EGO, observation)
+
     def _route_index(self, options: dict[str, Any], world_seed: int) -> int:
         for option in options:
             check_name(option, _RESET_OPTIONS, "reset option")
-        route, count = options.get("route"), len(self.plans)
-        if route is None:
-            return int(keyed_hash(world_seed, int(Stream.ROUTE), 0, 0)) % count
-        if isinstance(route, str):
-            check_name(route, self.route_ids, "route id")
-            return self.route_ids.index(route)
-        if isinstance(route, bool) or not isinstance(route, int | np.integer):
-            raise ValueError(f"options['route'] is an id (str) or an index (int); got {route!r}.")
-        if not 0 <= route < count:
-            raise ValueError(
-                f"Route index {route} is not in 0..{count - 1}; for the route whose id is {route} "
-                f"give the string '{route}'. Ids: {', '.join(self.route_ids)}."
-            )
-        return int(route)
-
-    def _ending(self, before: Standing, after: Standing) -> tuple[bool, bool]:
-        """Whether the episode is terminated, and whether it is truncated."""
-        finished = int(self.view.state.finished[_EGO])
-        stopped = any(after.counts[kind] > before.counts[kind] for kind in self._stops)
-        truncated = finished == EventKind.TIMEOUT
-        return stopped or (finished != 0 and not truncated), truncated
-
-    def _info(self, before: Standing, after: Standing, events: tuple[Event, ...]) -> Info:
-        state, plan = self.view.state, self.plan
-        finished = int(state.finished[_EGO])
-        return {
-            "route_id": plan.route_id,
-            "route_completion": 100.0 * after.done_m / plan.length_m,
-            "infraction_penalty": infraction_penalty(after, self._penalties),
-            "driving_score": 100.0 * score_metres(after, self._penalties) / plan.length_m,
-            "game_time_s": int(state.tick) * TICK_S,
-            "reward_terms": reward_terms(before, after, self._penalties),
-            "events": events,
-            "finished": EventKind(finished).name.lower() if finished else "",
-        }
+        if options.get("route") is None:
+            return int(keyed_hash(world_seed, int(Stream.ROUTE), 0, 0)) % len(self.plans)
+        return self._course.route_index(options["route"])

@@ -2,6 +2,7 @@
 
 `images/town05.png` is a moment of a drive in the shipped town: the whole of it and the streets
 around the ego. `images/prompt.png` is what an agent is told at that moment, in the ego frame.
+`images/view.png` is that moment as `render_mode="rgb_array"` shows it.
 """
 
 from __future__ import annotations
@@ -17,40 +18,37 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 from numpy.typing import NDArray
+from PIL import Image
 
 from agents import load_agent
+from di_envs.drawing import (
+    ACTOR,
+    BRIDGE_M,
+    EDGE,
+    EGO,
+    LAND,
+    LIGHT,
+    PAPER,
+    ROUTE,
+    SURFACE,
+    TARGET,
+    Array,
+    box,
+    crosswalk_bars,
+    stop_line_colours,
+    stop_line_ends,
+    surfaces,
+)
 from di_envs.map_chunks import MapKind, build_map_chunks
 from di_envs.route_env import RouteEnv
-from di_envs.town.lanes import LaneKind, Lanes, LightState, SignalKind
+from di_envs.town.lanes import LightState
 from di_envs.world.state import ActorKind
 from di_envs.world.world import WorldView
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # (after the choice of a backend without windows)
 
-Array = NDArray[np.float64]
-
 IMAGES = Path(__file__).resolve().parent / "images"
-LAND, PAPER = "#e9ece4", "#ffffff"
-SURFACE = {
-    LaneKind.SIDEWALK: "#cdcdc5",
-    LaneKind.SHOULDER: "#83888f",
-    LaneKind.PARKING: "#777c84",
-    LaneKind.DRIVING: "#5c626b",
-}
-ROUTE, EGO, TARGET = "#3b8eff", "#ff5a36", "#ffffff"
-LIGHT = {LightState.GREEN: "#2bd46a", LightState.YELLOW: "#ffc928", LightState.RED: "#ff3b3b"}
-ACTOR = {
-    ActorKind.CAR: "#f4f1e8",
-    ActorKind.VAN: "#bfe3ff",
-    ActorKind.TRUCK: "#ffdb99",
-    ActorKind.BUS: "#ffb36b",
-    ActorKind.MOTORCYCLE: "#e3b7ff",
-    ActorKind.BICYCLE: "#b6f2c4",
-    ActorKind.WALKER: "#ffe14d",
-}
-BRIDGE_M = 3.0  # surfaces above this are drawn over the streets below
-PIECE = 40  # points of a lane that are drawn as one polygon
 NEAR_M = (68.0, 76.0)  # width and height of the second panel
 
 
@@ -89,25 +87,6 @@ def liveliness(view: WorldView) -> int:
     return sum(counts.values()) + 2 * len(counts) + 4 * len(colours) + moving
 
 
-def strip(points: Array, width_m: Array) -> Array:
-    """The outline (2N, 2) of a lane's surface from its centre points (N, 4) and widths (N,)."""
-    right = np.stack([-np.sin(points[:, 3]), np.cos(points[:, 3])], axis=1)
-    reach = right * (0.5 * width_m + 0.05)[:, None]  # a little over, so that no seam shows
-    return np.concatenate([points[:, :2] + reach, (points[:, :2] - reach)[::-1]])
-
-
-def surfaces(lanes: Lanes, kind: LaneKind, above: bool) -> list[Array]:
-    """Outlines of all lanes of a kind, above or below the level of bridges."""
-    outlines = []
-    for lane in np.flatnonzero(lanes.kind == kind):
-        first, end = lanes.first[lane], lanes.first[lane] + lanes.count[lane]
-        for begin in range(first, end - 1, PIECE):
-            rows = slice(begin, min(begin + PIECE + 1, end))
-            if (lanes.points[rows, 2].mean() > BRIDGE_M) == above:
-                outlines.append(strip(lanes.points[rows], lanes.width_m[rows]))
-    return outlines
-
-
 def draw_town(axes: Axes, view: WorldView, *, line_width: float) -> None:
     """Surfaces and lane lines; bridges last."""
     lanes = view.town.lanes
@@ -142,45 +121,17 @@ def draw_town(axes: Axes, view: WorldView, *, line_width: float) -> None:
 
 
 def draw_crosswalks(axes: Axes, view: WorldView) -> None:
-    """Bars across the road, 0.5 m wide at 1 m."""
-    walks = view.town.crosswalks
-    bars = []
-    for start, end, width in zip(walks.start, walks.end, walks.width_m, strict=True):
-        along = (end - start)[:2]
-        length = float(np.hypot(*along))
-        along, across = along / length, np.array([-along[1], along[0]]) / length * width / 2
-        for station in np.arange(0.25, length - 0.5, 1.0):
-            a, b = start[:2] + along * station, start[:2] + along * (station + 0.5)
-            bars.append(np.array([a - across, b - across, b + across, a + across]))
+    """Bars across the road."""
+    bars = crosswalk_bars(view.town.crosswalks)
     axes.add_collection(PolyCollection(bars, facecolor="white", alpha=0.5, zorder=5.5))
 
 
 def draw_signals(axes: Axes, view: WorldView, *, line_width: float) -> None:
-    """Stop lines in the colour that their light shows; octagons' red for stop signs."""
-    signals, state = view.town.signals, view.state
-    segments, colours = [], []
-    for index, pose in enumerate(signals.stop_pose):
-        signal = signals.stop_signal[index]
-        across = np.array([-np.sin(pose[3]), np.cos(pose[3])]) * 0.45 * signals.stop_width_m[index]
-        segments.append(np.array([pose[:2] - across, pose[:2] + across]))
-        is_light = signals.kind[signal] == SignalKind.LIGHT
-        colours.append(LIGHT[LightState(int(state.light[signal]))] if is_light else "#ffffff")
+    """Stop lines in the colour that their light shows."""
+    lines = list(stop_line_ends(view.town.signals))
+    colours = stop_line_colours(view)
     axes.add_collection(
-        LineCollection(segments, colors=colours, linewidth=line_width, zorder=6, capstyle="butt")
-    )
-
-
-def box(x: float, y: float, yaw: float, half_length: float, half_width: float) -> Array:
-    """Outline (5, 2) of a vehicle, with a pointed front that shows where it is heading."""
-    nose = 0.8 * half_length
-    local = np.array([[-1, -1], [-1, 1], [0, 1], [0, 0], [0, -1]], float) * (
-        half_length,
-        half_width,
-    )
-    local[2:, 0] = nose, half_length, nose
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.stack(
-        [x + c * local[:, 0] - s * local[:, 1], y + s * local[:, 0] + c * local[:, 1]], 1
+        LineCollection(lines, colors=colours, linewidth=line_width, zorder=6, capstyle="butt")
     )
 
 
@@ -194,7 +145,7 @@ def draw_actors(
         where = float(state.x[actor]), float(state.y[actor])
         level = 16.0 if state.z[actor] > BRIDGE_M else 8.0
         if kind == ActorKind.WALKER:
-            marks: dict[str, Any] = {"markeredgecolor": "#30343a", "mew": 0.5, "clip_on": True}
+            marks: dict[str, Any] = {"markeredgecolor": EDGE, "mew": 0.5, "clip_on": True}
             axes.plot(*where, "o", color=ACTOR[kind], markersize=walker_size, zorder=level, **marks)
             continue
         size = ego_scale if ego else scale
@@ -205,7 +156,7 @@ def draw_actors(
             size * float(state.half_width[actor]),
         )
         colour = EGO if ego else ACTOR[kind]
-        edge = "white" if ego else "#30343a"
+        edge = "white" if ego else EDGE
         axes.add_patch(
             Polygon(outline, facecolor=colour, edgecolor=edge, linewidth=0.6, zorder=level + ego)
         )
@@ -281,7 +232,7 @@ def legend() -> list[Any]:
         marks: dict[str, Any] = {
             "marker": "s",
             "markersize": 9,
-            "markeredgecolor": "#30343a",
+            "markeredgecolor": EDGE,
             "mew": 0.5,
         }
         return Line2D([], [], linestyle="", color=colour, label=label, **marks)
@@ -361,8 +312,18 @@ def _draw_obstacles(axes: Axes, obstacles: NDArray[np.float32]) -> None:
             axes.arrow(y, x, vy, vx, head_width=0.9, color="#333333", linewidth=0.7, zorder=4)
 
 
+def view_picture(env: RouteEnv) -> NDArray[np.uint8]:
+    """The view for people of the same moment, with the front camera."""
+    filmed = RouteEnv(
+        suite="town05_long", observations=("prompt", "camera"), render_mode="rgb_array"
+    )
+    filmed.restore_state(env.save_state())
+    picture: NDArray[np.uint8] = filmed.render()
+    return picture
+
+
 def main() -> None:
-    """Draws both pictures."""
+    """Draws the pictures."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -382,6 +343,8 @@ def main() -> None:
         figure.savefig(arguments.output / name, bbox_inches="tight", pad_inches=0.08)
         plt.close(figure)
         print(f"written: {arguments.output / name}")
+    Image.fromarray(view_picture(env)).save(arguments.output / "view.png", optimize=True)
+    print(f"written: {arguments.output / 'view.png'}")
 
 
 if __name__ == "__main__":

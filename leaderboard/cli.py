@@ -1,4 +1,4 @@
-"""The command line: `driveinsight evaluate`, `show`, `agents` and `suites`.
+"""The command line: `driveinsight evaluate`, `drive`, `show`, `agents` and `suites`.
 
 What is slow to import (Numba, the environments) is imported by the command that needs it, and only
 after the arguments are known to be right.
@@ -17,6 +17,8 @@ import tyro
 from rich.console import Console
 from rich.markup import escape
 
+from leaderboard.drive_command import DRIVE_DESCRIPTION, Drive
+
 if TYPE_CHECKING:
     from di_envs.suites import Suite
     from leaderboard.record import RunRecord
@@ -31,7 +33,8 @@ First steps:
   driveinsight agents                                     who can drive
   driveinsight suites                                     where
   driveinsight evaluate --agent expert --suite town05_tiny
-  driveinsight show results/expert-town05_tiny            the table again"""
+  driveinsight show results/expert-town05_tiny            the table again
+  driveinsight drive --agent expert --suite town05_tiny --video out.mp4"""
 
 
 EVALUATE_DESCRIPTION = """Drive an agent over routes and seeds, and print the leaderboard table.
@@ -120,6 +123,7 @@ class Suites:
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_DESCRIPTION)]
+    | Annotated[Drive, tyro.conf.subcommand("drive", description=DRIVE_DESCRIPTION)]
     | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_DESCRIPTION)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
@@ -158,6 +162,8 @@ def _run(command: Command) -> int:
     match command:
         case Evaluate():
             return _evaluate(command)
+        case Drive():
+            return _drive(command)
         case Show():
             return _show(command)
         case Agents():
@@ -218,13 +224,42 @@ def _evaluate(command: Evaluate) -> int:
     return EXIT_CRASHED if run.simulation_crashed else 0
 
 
-def _choose(command: Evaluate) -> tuple[dict[str, Any], Suite]:
+def _drive(command: Drive) -> int:
+    options, _ = _choose(command)
+
+    from leaderboard.drive import drive, record_lines
+    from leaderboard.jobs import RunSpec
+    from leaderboard.record import SIMULATION_CRASHED
+    from leaderboard.video import VideoError, check_video
+    from leaderboard.warm_up import SetupError
+
+    spec = RunSpec(agent=command.agent, options=options, rules=command.rules)
+    try:
+        if command.video is not None:
+            check_video(command.video)
+        record = drive(
+            spec,
+            route_id=command.route,
+            seed=command.seed,
+            console=Console(stderr=True),
+            video=command.video,
+            camera=not command.no_camera,
+        )
+    except (SetupError, VideoError) as error:
+        raise UsageError(str(error)) from error
+    written = [] if command.video is None else [f"Written: {command.video}"]
+    lines = [*record_lines(record), *written]
+    Console().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)
+    return EXIT_CRASHED if record.status == SIMULATION_CRASHED else 0
+
+
+def _choose(command: Evaluate | Drive) -> tuple[dict[str, Any], Suite]:
     """The environment's options and the suite, checked as far as goes without loading a town."""
     from di_envs.config import RouteEnvConfig
     from di_envs.suites import choose_suite
 
-    names = ("suite", "town", "routes", "signals", "traffic", "walkers", "rules")
-    given = {name: getattr(command, name) for name in names}
+    names = ("suite", "town", "routes", "signals", "traffic", "walkers", "weather", "rules")
+    given = {name: getattr(command, name, None) for name in names}
     options = {name: value for name, value in given.items() if value is not None}
     if command.route_ids:
         options["route_ids"] = command.route_ids

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -98,6 +99,12 @@ class World:
         self._ego_model = EgoModel().parameters()
         self._view: WorldView | None = None
 
+    def twin(self) -> World:
+        """Another world in the same town, without an episode; it shares the town's tables."""
+        twin = copy.copy(self)
+        twin._view = None
+        return twin
+
     @property
     def view(self) -> WorldView:
         """The present state, read-only.
@@ -169,6 +176,14 @@ class World:
             events += [_event(row) for row in self._event_rows[:rows]]
             ticks -= batch
         return events
+
+    def remove_ego(self, ego: int) -> None:
+        """Takes an ego off the road for the rest of the episode; what it has done still counts."""
+        state = self._state
+        state.kind[ego] = ActorKind.ABSENT
+        state.lane[ego] = -1
+        state.occupied[ego] = -1
+        state.speed[ego] = state.acceleration[ego] = state.yaw_rate[ego] = 0.0
 
     def save(self) -> Snapshot:
         """Copies the state whole."""

@@ -1,0 +1,149 @@
+"""What an environment drives: options checked, suite chosen, town and routes loaded, score kept.
+
+Environments of one ego and of several start from the same `Course` and count by it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from di_envs.config import RouteEnvConfig, check_name
+from di_envs.observation import Observer, observation_space
+from di_envs.reward import (
+    PENALTIES,
+    Standing,
+    infraction_penalty,
+    reward_terms,
+    score_metres,
+)
+from di_envs.suites import choose_suite
+from di_envs.town.loading import load_town
+from di_envs.town.plan import RoutePlan
+from di_envs.town.town import Town
+from di_envs.world.state import TICK_S, EventKind
+from di_envs.world.world import Event, WorldConfig, WorldView
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """A town, its routes, and how driving them is counted. Never changes, so it can be shared.
+
+    Attributes:
+        config: The options, with the suite's values in place of None.
+        town: The town.
+        plans: The routes that there are to drive.
+        world_config: How many others there are.
+        penalties: Factor of each kind of infraction.
+        stops: Events that end an episode besides those by which the rules do.
+    """
+
+    config: RouteEnvConfig
+    town: Town
+    plans: tuple[RoutePlan, ...]
+    world_config: WorldConfig
+    penalties: Mapping[EventKind, float]
+    stops: tuple[EventKind, ...]
+
+    @property
+    def route_ids(self) -> tuple[str, ...]:
+        """Ids of the routes, by index."""
+        return tuple(plan.route_id for plan in self.plans)
+
+    def route_index(self, route: Any) -> int:
+        """The index of a route given by id (a string) or by index (an integer).
+
+        Raises:
+            ValueError: If there is no such route.
+        """
+        count = len(self.plans)
+        if isinstance(route, str):
+            check_name(route, self.route_ids, "route id")
+            return self.route_ids.index(route)
+        if isinstance(route, bool) or not isinstance(route, int | np.integer):
+            raise ValueError(f"options['route'] is an id (str) or an index (int); got {route!r}.")
+        if not 0 <= route < count:
+            raise ValueError(
+                f"Route index {route} is not in 0..{count - 1}; for the route whose id is {route} "
+                f"give the string '{route}'. Ids: {', '.join(self.route_ids)}."
+            )
+        return int(route)
+
+    def observation_space(self) -> spaces.Dict:
+        """The space of what an ego sees."""
+        return observation_space(self.config.observations, self.config.cameras, self.config.lidar)
+
+    def observer(self) -> Observer:
+        """Looks at a world through the first ego's eyes; `of_ego` makes those of others."""
+        config = self.config
+        return Observer(
+            self.town,
+            config.observations,
+            cameras=config.cameras,
+            lidar=config.lidar,
+            weather=config.weather,
+        )
+
+    def ending(
+        self, view: WorldView, ego: int, before: Standing, after: Standing
+    ) -> tuple[bool, bool]:
+        """Whether an ego's episode is terminated, and whether it is truncated."""
+        finished = int(view.state.finished[ego])
+        stopped = any(after.counts[kind] > before.counts[kind] for kind in self.stops)
+        truncated = finished == EventKind.TIMEOUT
+        return stopped or (finished != 0 and not truncated), truncated
+
+    def info(
+        self,
+        view: WorldView,
+        ego: int,
+        before: Standing,
+        after: Standing,
+        events: tuple[Event, ...],
+    ) -> dict[str, Any]:
+        """An ego's `info` of a step between two standings; `RouteEnv` says what is in it."""
+        state, plan = view.state, view.plans[ego]
+        finished = int(state.finished[ego])
+        return {
+            "route_id": plan.route_id,
+            "route_completion": 100.0 * after.done_m / plan.length_m,
+            "infraction_penalty": infraction_penalty(after, self.penalties),
+            "driving_score": 100.0 * score_metres(after, self.penalties) / plan.length_m,
+            "game_time_s": int(state.tick) * TICK_S,
+            "reward_terms": reward_terms(before, after, self.penalties),
+            "events": events,
+            "finished": EventKind(finished).name.lower() if finished else "",
+        }
+
+
+def load_course(options: Mapping[str, Any]) -> Course:
+    """Loads the town and plans the routes.
+
+    Args:
+        options: See `RouteEnvConfig`.
+
+    Raises:
+        ValueError: If an option is unknown or refused, or a route cannot be planned.
+        FileNotFoundError: If there is no such town.
+    """
+    config = RouteEnvConfig.from_mapping(options)
+    suite = choose_suite(
+        config.suite, town=config.town, routes=config.routes, signals=config.signals
+    )
+    vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
+    walkers = suite.traffic.walkers if config.walkers is None else config.walkers
+    weather = config.weather or suite.weather
+    town = load_town(suite.town_path, suite.signals)
+    return Course(
+        config=dataclasses.replace(config, traffic=vehicles, walkers=walkers, weather=weather),
+        town=town,
+        plans=suite.plans(town, config.route_ids),
+        world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
+        penalties=PENALTIES[config.rules],
+        stops=tuple(EventKind[name.upper()] for name in config.terminate_on),
+    )

@@ -1,0 +1,292 @@
+"""`RouteVectorEnv`: many routes driven at once, as a native Gymnasium vector environment.
+
+The worlds share one town with all its tables, and threads share out the worlds: kernels hold no
+Python lock, so they run side by side in one process, without copies between processes. Each world
+is a `RouteEnv` of its own, so what comes out is bit for bit what single ones give, for any number
+of threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, create_empty_array
+from numpy.typing import NDArray
+
+from di_envs.actions import checked_action
+from di_envs.route_env import Info, Observation, RouteEnv
+
+Steps = tuple[
+    Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
+]
+
+
+class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
+    """N `RouteEnv`s side by side, by Gymnasium's rules for autoreset, seeds and `info`.
+
+    `gym.make_vec("DriveInsight-Town05Long-v0", num_envs=16)` makes one. Observations, rewards and
+    flags come as fresh arrays with a leading axis of N.
+
+    Attributes:
+        envs: The environments, which share their town, routes and tables.
+        threads: How many threads step them.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Loads the town once, and makes the worlds.
+
+        Args:
+            num_envs: How many worlds.
+            threads: How many threads step them; None takes one a core, at most one a world. The
+                results are the same bits for any number.
+            autoreset_mode: `NextStep`: the step after an episode's end resets, whatever its action
+                was. `SameStep`: an ending step already returns the next episode's observation, and
+                the last one in `info["final_obs"]`. `Disabled`: the caller resets with
+                `options={"reset_mask": …}`.
+            max_episode_steps: Truncates episodes after so many steps.
+            render_mode: None, or `rgb_array`: `render` returns a picture of each world.
+            options: See `RouteEnvConfig`.
+
+        Raises:
+            ValueError: If a number is not positive, or an option is refused.
+        """
+        threads = min(_cores(), num_envs) if threads is None else threads
+        steps = 1 if max_episode_steps is None else max_episode_steps
+        for name, value in (
+            ("num_envs", num_envs),
+            ("threads", threads),
+            ("max_episode_steps", steps),
+        ):
+            if value < 1:
+                raise ValueError(f"{name} must be at least 1; got {value!r}.")
+        if render_mode == "human":
+            raise ValueError(
+                "Many worlds have no window: use render_mode='rgb_array', or gymnasium.make for "
+                "one of them."
+            )
+        first = RouteEnv(render_mode=render_mode, **options)
+        self.envs = (first, *(first.twin() for _ in range(num_envs - 1)))
+        self.num_envs, self.threads = num_envs, threads
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = first.render_mode
+        self.single_observation_space = first.observation_space
+        self.single_action_space = first.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._limit = max_episode_steps
+        self._steps = [0] * num_envs
+        self._ended = np.zeros(num_envs, bool)
+        # the calling thread works too
+        self._pool = ThreadPoolExecutor(threads - 1, "worlds") if threads > 1 else None
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[Observation, Info]:
+        """Starts an episode in every world, or in those of a mask.
+
+        Args:
+            seed: One for each world; a number stands for `seed, seed + 1, …`; None continues each
+                world's own sequence.
+            options: `reset_mask`: (N,) bool, the worlds to reset; the others are left as they are,
+                and so are their rows of the observation. The rest goes to `RouteEnv.reset`.
+
+        Raises:
+            ValueError: If the seeds or the mask have another length, or an option is refused.
+        """
+        seeds = self._seeds(seed)
+        left = dict(options or {})
+        mask = self._mask(left.pop("reset_mask", None))
+        chosen = np.flatnonzero(mask).tolist()
+        observations: list[Observation] = [{}] * self.num_envs
+        infos: list[Info] = [{}] * self.num_envs
+
+        def begin(index: int) -> None:
+            observations[index], infos[index] = self._begin(index, seeds[index], left)
+
+        self._each(chosen, begin)
+        for index in np.flatnonzero(~mask).tolist():
+            observations[index] = self.envs[index].observe()
+        return self._batch(observations), self._infos(infos, chosen)
+
+    def step(self, actions: NDArray[np.float32]) -> Steps:
+        """Steps every world; those whose episode has ended are reset as `autoreset_mode` says.
+
+        Args:
+            actions: (N, 3) throttle, steer, brake of each.
+
+        Raises:
+            ValueError: If an action is refused, before any world has moved.
+            gymnasium.error.ResetNeeded: If a world that has ended is not reset automatically.
+        """
+        count, next_step = self.num_envs, self.autoreset_mode == AutoresetMode.NEXT_STEP
+        resets = self._ended if next_step else np.zeros(count, bool)
+        controls = self._checked(actions, resets)
+        observations: list[Observation] = [{}] * count
+        infos: list[Info] = [{}] * count
+        rewards = np.zeros(count)
+        ended = np.zeros((2, count), bool)  # terminated, truncated
+        finals: dict[int, tuple[Observation, Info]] = {}
+
+        def advance(index: int) -> None:
+            if resets[index]:
+                observations[index], infos[index] = self._begin(index, None, {})
+                return
+            step = self._step(index, controls[index])
+            observations[index], rewards[index], ended[0, index], ended[1, index], info = step
+            if ended[:, index].any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
+                finals[index] = observations[index], info
+                observations[index], info = self._begin(index, None, {})
+            infos[index] = info
+
+        self._each(range(count), advance)
+        self._ended = ended[0] | ended[1]
+        batched: Info = {}
+        for index, (observation, info) in sorted(finals.items()):
+            final = {"final_obs": observation, "final_info": info}
+            batched = self._add_info(batched, final, index)
+        batched |= self._infos(infos, range(count))
+        return self._batch(observations), rewards, ended[0], ended[1], batched
+
+    def render(self) -> tuple[Any, ...]:
+        """A frame of each world."""
+        return tuple(env.render() for env in self.envs)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Each environment's attribute of that name; methods are called with the arguments."""
+        found = [getattr(env, name) for env in self.envs]
+        return tuple(value(*args, **kwargs) if callable(value) else value for value in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Each environment's attribute of that name."""
+        return tuple(getattr(env, name) for env in self.envs)
+
+    def close_extras(self, **_options: Any) -> None:
+        """Stops the threads and closes the environments."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        for env in self.envs:
+            env.close()
+
+    def _begin(
+        self, index: int, seed: int | None, options: Mapping[str, Any]
+    ) -> tuple[Observation, Info]:
+        self._steps[index] = 0
+        self._ended[index] = False
+        return self.envs[index].reset(seed=seed, options=options)
+
+    def _step(
+        self, index: int, control: NDArray[np.float64]
+    ) -> tuple[Observation, float, bool, bool, Info]:
+        observation, reward, terminated, truncated, info = self.envs[index].step(control)
+        self._steps[index] += 1
+        truncated = truncated or (self._limit is not None and self._steps[index] >= self._limit)
+        return observation, reward, terminated, truncated, info
+
+    def _each(self, indices: Iterable[int], work: Callable[[int], None]) -> None:
+        """Does the work for each index, the threads taking the next one as they become free."""
+        todo = iter(indices)  # next() on it holds the lock of the interpreter: nobody gets it twice
+
+        def labour() -> None:
+            for index in todo:
+                work(index)
+
+        helpers = (
+            []
+            if self._pool is None
+            else [self._pool.submit(labour) for _ in range(self.threads - 1)]
+        )
+        try:
+            labour()
+        finally:
+            errors = [helper.exception() for helper in helpers]
+        for error in filter(None, errors):
+            raise error
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + index for index in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"There are {self.num_envs} worlds, so as many seeds; got {seed!r}.")
+        return seed
+
+    def _mask(self, mask: Any) -> NDArray[np.bool_]:
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        mask = np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise ValueError(
+                f"options['reset_mask'] has a bool for each of the {self.num_envs} worlds, one or "
+                f"more of them true; got {mask!r}."
+            )
+        return mask
+
+    def _checked(self, actions: Any, resets: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+        """The actions of those that will be stepped, all checked before the first one moves."""
+        rows = np.asarray(actions)
+        if rows.shape != (self.num_envs, 3):
+            raise ValueError(
+                f"Actions have shape ({self.num_envs}, 3): throttle, steer, brake of each world; "
+                f"got shape {rows.shape}."
+            )
+        rows = np.where(resets[:, None], 0.0, rows)
+        return [checked_action(row) for row in rows]
+
+    def _batch(self, observations: Sequence[Observation]) -> Observation:
+        """Observations as arrays with a leading axis, each a fresh one."""
+        batch: Any = create_empty_array(self.single_observation_space, n=self.num_envs, fn=np.empty)
+        for name, rows in batch.items():
+            for index, observation in enumerate(observations):
+                rows[index] = observation[name]
+        return dict(batch)
+
+    def _infos(self, infos: Sequence[Info], chosen: Iterable[int]) -> Info:
+        """`info` as Gymnasium batches it: arrays, each with a mask of who has the entry."""
+        indices = list(chosen)
+        if len(indices) == self.num_envs:
+            return batched_infos(infos)
+        batched: Info = {}
+        for index in indices:
+            batched = self._add_info(batched, infos[index], index)
+        return batched
+
+
+def batched_infos(infos: Sequence[Info]) -> Info:
+    """What `VectorEnv._add_info` makes of infos that all have the same keys, in less time."""
+    batched: Info = {}
+    for key, first in infos[0].items():
+        values = [info[key] for info in infos]
+        if isinstance(first, dict):
+            batched[key] = batched_infos(values)
+        elif type(first) in (int, float, bool):
+            batched[key] = np.array(values, type(first))
+        else:
+            batched[key] = np.fromiter(values, object, len(values))
+        batched[f"_{key}"] = np.ones(len(infos), bool)
+    return batched
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

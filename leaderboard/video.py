@@ -1,0 +1,179 @@
+"""Writes frames into a video: MP4 and its like through ffmpeg, GIF without it."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+FFMPEG_SUFFIXES = (".mp4", ".mkv", ".mov")
+GIF_SUFFIX = ".gif"
+GIF_WIDTH_PX = 480  # all frames of a GIF are held in memory until it is written
+GIF_FPS = 10.0
+
+
+class VideoError(Exception):
+    """A video cannot be written; says what to do instead."""
+
+
+class VideoWriter(Protocol):
+    """Takes frames in order; used in a `with`, which finishes the file."""
+
+    def add(self, frame: NDArray[np.uint8]) -> None:
+        """Adds a frame (H, W, 3) RGB, of the size of the first."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...
+
+
+def open_video(path: Path, fps: float, ffmpeg: str | None = None) -> VideoWriter:
+    """A writer for the format that the file's name ends in.
+
+    Args:
+        path: The file; its folder is made.
+        fps: Frames a second.
+        ffmpeg: The program to use; None looks for it.
+
+    Raises:
+        VideoError: If the format is unknown, or it needs ffmpeg and there is none.
+    """
+    program = ffmpeg or check_video(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise VideoError(f"cannot make the folder of '{path}': {error}") from error
+    return GifWriter(path, fps) if program is None else FfmpegWriter(path, fps, program)
+
+
+def check_video(path: Path) -> str | None:
+    """Looks whether a file's format can be written.
+
+    Returns:
+        The ffmpeg program to write it with, None if it needs none.
+
+    Raises:
+        VideoError: If the format is unknown, or it needs ffmpeg and there is none.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (*FFMPEG_SUFFIXES, GIF_SUFFIX):
+        known = ", ".join((*FFMPEG_SUFFIXES, GIF_SUFFIX))
+        raise VideoError(f"a video's file name ends in one of {known}; got '{path}'")
+    return None if suffix == GIF_SUFFIX else find_ffmpeg(path)
+
+
+def find_ffmpeg(path: Path) -> str:
+    """The ffmpeg program: that of the package imageio-ffmpeg, else the system's.
+
+    Raises:
+        VideoError: If there is neither.
+    """
+    with contextlib.suppress(ImportError, RuntimeError):
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    found = shutil.which("ffmpeg")
+    if found is None:
+        raise VideoError(
+            f"there is no ffmpeg to write '{path}' with: pip install 'driveinsight[video]', or "
+            f"install ffmpeg, or write a GIF: --video {path.with_suffix(GIF_SUFFIX)}"
+        )
+    return found
+
+
+class FfmpegWriter:
+    """Sends frames to ffmpeg as they come; H.264, playable everywhere."""
+
+    def __init__(self, path: Path, fps: float, program: str) -> None:
+        self._path, self._fps, self._program = path, fps, program
+        self._process: subprocess.Popen[bytes] | None = None
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed in __exit__)
+
+    def add(self, frame: NDArray[np.uint8]) -> None:
+        """Adds a frame.
+
+        Raises:
+            VideoError: If ffmpeg gives up; with what it said last.
+        """
+        if self._process is None:
+            self._process = self._started(frame.shape[1], frame.shape[0])
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(np.ascontiguousarray(frame).tobytes())
+        except OSError as error:
+            raise VideoError(self._complaint()) from error
+
+    def _started(self, width: int, height: int) -> subprocess.Popen[bytes]:
+        raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+        coded = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-preset", "veryfast"]
+        even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]  # as yuv420p wants it
+        command = [self._program, "-y", "-loglevel", "error", *raw, "-r", f"{self._fps:g}"]
+        command += ["-i", "-", *even, *coded, "-movflags", "+faststart", str(self._path)]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=self._said)
+
+    def _complaint(self) -> str:
+        assert self._process is not None
+        self._process.wait()
+        self._said.seek(0)
+        lines = self._said.read().decode(errors="replace").strip().splitlines()
+        return f"ffmpeg could not write '{self._path}': {lines[-1] if lines else 'it said nothing'}"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        try:
+            if self._process is not None:
+                assert self._process.stdin is not None
+                with contextlib.suppress(OSError):
+                    self._process.stdin.close()
+                if self._process.wait() != 0 and kind is None:
+                    raise VideoError(self._complaint())
+        finally:
+            self._said.close()
+
+
+class GifWriter:
+    """Keeps smaller frames, at most `GIF_FPS` a second, and writes them at the end."""
+
+    def __init__(self, path: Path, fps: float) -> None:
+        self._path = path
+        self._every = max(1, round(fps / GIF_FPS))
+        self._frame_ms = round(1000.0 * self._every / fps)
+        self._seen = 0
+        self._frames: list[Image.Image] = []
+
+    def add(self, frame: NDArray[np.uint8]) -> None:
+        """Adds a frame, or passes over it where they come too fast for a GIF."""
+        if self._seen % self._every == 0:
+            height = round(frame.shape[0] * GIF_WIDTH_PX / frame.shape[1])
+            small = Image.fromarray(frame).resize((GIF_WIDTH_PX, height))
+            self._frames.append(small.quantize(128, Image.Quantize.FASTOCTREE))
+        self._seen += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        if self._frames:
+            self._frames[0].save(
+                self._path,
+                save_all=True,
+                append_images=self._frames[1:],
+                duration=self._frame_ms,
+                loop=0,
+            )
