@@ -89,4 +89,6 @@ def test_numbers_of_streams_are_part_of_every_seed_and_stay():
         "VEHICLE_COLOUR": 13,
         "SCENERY": 14,
         "RAIN": 15,
+        "LIDAR": 16,
+        "LIDAR_NOISE": 17,
     }
