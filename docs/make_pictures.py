@@ -2,7 +2,8 @@
 
 `images/town05.png` is a moment of a drive in the shipped town: the whole of it and the streets
 around the ego. `images/prompt.png` is what an agent is told at that moment, in the ego frame.
-`images/view.png` is that moment as `render_mode="rgb_array"` shows it.
+`images/view.png` is that moment as `render_mode="rgb_array"` shows it. `images/lidar.png` is a
+sweep of the LiDAR at that moment, over the map.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ from di_envs.drawing import (
 )
 from di_envs.map_chunks import MapKind, build_map_chunks
 from di_envs.route_env import RouteEnv
+from di_envs.sensors.lidar import Lidar
+from di_envs.sensors.lidar_config import LidarConfig
+from di_envs.sensors.tags import PALETTE, Tag
 from di_envs.town.lanes import LightState
 from di_envs.world.state import ActorKind
 from di_envs.world.world import WorldView
@@ -50,6 +54,18 @@ import matplotlib.pyplot as plt  # (after the choice of a backend without window
 
 IMAGES = Path(__file__).resolve().parent / "images"
 NEAR_M = (68.0, 76.0)  # width and height of the second panel
+SWEEP_M = (96.0, 84.0)  # … of the picture of the LiDAR
+# brighter than CARLA's palette where that is as dark as the map below
+SWEEP_COLOURS = {
+    Tag.ROADS: "#d9c8dd",
+    Tag.ROAD_LINES: "#ffffff",
+    Tag.TERRAIN: "#2f8f3a",
+    Tag.SIDEWALKS: "#f423e8",
+    Tag.CAR: "#2f6bff",
+    Tag.TRUCK: "#00c2d1",
+    Tag.BUS: "#00c2d1",
+    Tag.BUILDINGS: "#111111",
+}
 
 
 def liveliest_moment(route: str, seed: int, seconds: float) -> tuple[RouteEnv, dict[str, Any]]:
@@ -322,6 +338,40 @@ def view_picture(env: RouteEnv) -> NDArray[np.uint8]:
     return picture
 
 
+def lidar_picture(env: RouteEnv) -> plt.Figure:
+    """A sweep over the map, in the world frame, coloured by what was hit."""
+    view, state = env.view, env.view.state
+    dense = LidarConfig(steps=1800, dropoff=0.0, dropoff_zero=0.0, semantic=True)
+    lidar = Lidar(view.town, dense, view.ego)
+    lidar.start(view)
+    sweep = lidar.observe()
+    hit = sweep["lidar"][:, 3] > 0.0
+    points, tags = sweep["lidar"][hit], sweep["lidar_semantic"][hit]
+    c, s = np.cos(state.yaw[view.ego]), np.sin(state.yaw[view.ego])
+    ego = np.array([state.x[view.ego], state.y[view.ego]])
+    x, y = (
+        ego[0] + c * points[:, 0] - s * points[:, 1],
+        ego[1] + s * points[:, 0] + c * points[:, 1],
+    )
+    figure, axes = plt.subplots(figsize=(9.6, 8.4), dpi=110, facecolor=PAPER)
+    corner = ego - np.array(SWEEP_M) / 2
+    title = "A sweep of 32 x 1800 rays over the map, by what was hit"
+    frame(axes, title, corner, corner + SWEEP_M)
+    draw_town(axes, view, line_width=1.0)
+    for tag in np.unique(
+        tags[(abs(x - ego[0]) < SWEEP_M[0] / 2) & (abs(y - ego[1]) < SWEEP_M[1] / 2)]
+    ):
+        colour = SWEEP_COLOURS.get(Tag(tag), tuple(np.array(PALETTE[tag]) / 255.0))
+        label = Tag(tag).name.lower().replace("_", " ")
+        chosen = tags == tag
+        axes.plot(x[chosen], y[chosen], ".", ms=2.2, mew=0, color=colour, zorder=20 + (tag > 10))
+        axes.plot([], [], "o", color=colour, mec=EDGE, mew=0.5, label=label)
+    outline = box(float(ego[0]), float(ego[1]), float(state.yaw[view.ego]), 2.45, 1.06)
+    axes.add_patch(Polygon(outline, facecolor=EGO, edgecolor="white", zorder=30, label="the ego"))
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=10)
+    return figure
+
+
 def main() -> None:
     """Draws the pictures."""
     parser = argparse.ArgumentParser(
@@ -339,6 +389,7 @@ def main() -> None:
     for name, figure in (
         ("town05.png", town_picture(env)),
         ("prompt.png", prompt_picture(observation)),
+        ("lidar.png", lidar_picture(env)),
     ):
         figure.savefig(arguments.output / name, bbox_inches="tight", pad_inches=0.08)
         plt.close(figure)
