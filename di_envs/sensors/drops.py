@@ -28,6 +28,8 @@ def add_glow(boxes, seen, cam, depth, rgb):
             continue
         dx, dy = boxes.centre[b, 0] - cam[0], boxes.centre[b, 1] - cam[1]
         dz = boxes.centre[b, 2] - cam[2]
+        if dx * math.cos(boxes.yaw[b]) + dy * math.sin(boxes.yaw[b]) <= 0.0:
+            continue  # it shines the other way: its housing, thin as it is, hides it
         ahead = dx * cam[3] + dy * cam[4] + dz * cam[5]
         if ahead < 0.5:
             continue

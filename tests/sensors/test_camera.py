@@ -14,6 +14,7 @@ import pytest
 import di_envs
 from di_envs.sensors.camera import FAR_M, CameraRig
 from di_envs.sensors.camera_config import RIGS, CameraConfig, Rig, rig_of
+from di_envs.sensors.scene import scene_of
 from di_envs.sensors.tags import Tag
 from di_envs.sensors.weather import PRESETS, weather_of
 from di_envs.town.lanes import LaneKind, LightState
@@ -181,6 +182,24 @@ def test_the_three_lights_differ_from_each_other(town, empty):
     assert (green - red)[..., 1].max() > 60
     assert (yellow - red)[..., 1].max() > 60
     assert (yellow - green)[..., 0].max() > 60
+
+
+def test_a_lamp_is_not_seen_from_behind(town, empty):
+    scene = scene_of(town)
+    lamp = 3  # the red one of the first light's far head, which hangs free
+    x, y, z, yaw = scene.lamps.pose[lamp]
+    for side, seen in ((-1.0, True), (1.0, False)):  # it shines against its yaw
+        place(empty, 0, x + side * 6.0 * math.cos(yaw), y + side * 6.0 * math.sin(yaw), 0.0, yaw)
+        towards = full(z_m=z, x_m=0.0, yaw_rad=0.0 if seen else math.pi)
+        pictures = []
+        for shown in (LightState.NONE, LightState.RED):
+            snapshot = empty.save()
+            views_of(snapshot.record).light[:] = LightState.NONE
+            views_of(snapshot.record).light[scene.lamps.signal[lamp]] = shown
+            empty.restore(snapshot)
+            pictures.append(images(empty, towards)["camera_front"].astype(int))
+        middle = (pictures[1] - pictures[0])[92:108, 152:168]
+        assert (middle.max() > 60) == seen
 
 
 def test_every_weather_looks_different_and_none_is_blank(town, empty):
