@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -77,9 +78,7 @@ def _joints(document: OpenDrive) -> Iterator[Joint]:
 
 
 def _joints_within(index: int, road: RoadRecord) -> Iterator[Joint]:
-    for number, (section, following) in enumerate(
-        zip(road.sections, road.sections[1:], strict=False)
-    ):
+    for number, (section, following) in enumerate(pairwise(road.sections)):
         for lane in section.lanes.values():
             for target in lane.successors:
                 yield Joint((index, number, lane.lane_id), False, (index, number + 1, target), True)

@@ -104,7 +104,7 @@ def spawn_traffic(
             f"expected room for {count} vehicles, but the town has {len(spots)} free places; "
             f"ask for fewer (traffic={len(spots)})"
         )
-    for actor, (lane, station) in zip(range(first, first + count), spots, strict=False):
+    for actor, (lane, station) in enumerate(spots[:count], first):
         _equip(state, actor, seed)
         state.lane[actor] = lane
         state.lane_m[actor] = station
