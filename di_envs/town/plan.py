@@ -22,6 +22,21 @@ class RoadOption(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ScenarioTrigger:
+    """Where on a route one of the Leaderboard's scenarios begins.
+
+    Attributes:
+        type: The Leaderboard 1.0's number of the scenario: 1, 3, 4, 7, 8, 9 or 10.
+        subtype: CARLA's name of the variant, such as `S4left`; empty where there is one only.
+        point: Index of the dense route point that triggers it.
+    """
+
+    type: int
+    subtype: str
+    point: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class RoutePlan:
     """A dense route of R points at about 1 m, and its T sparse target points. Read-only.
 
@@ -38,6 +53,7 @@ class RoutePlan:
     lane_m: NDArray[np.float64]  # (R,) station along that lane
     route_m: NDArray[np.float64]  # (R,) distance along the route (sum of straight steps), from 0
     targets: NDArray[np.int32]  # (T,) indices of the target points (50 m rule), ascending
+    scenarios: tuple[ScenarioTrigger, ...] = ()  # by ascending point, one a point
 
     @property
     def length_m(self) -> float:
