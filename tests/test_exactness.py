@@ -23,7 +23,7 @@ from leaderboard.engines import PoolEngine, SerialEngine
 from leaderboard.episode_hash import EpisodeHash
 from leaderboard.jobs import RunSpec, plan_jobs
 
-OPTIONS = {"suite": "toy", "traffic": 12, "walkers": 6}
+OPTIONS = {"suite": "toy", "traffic": 12, "walkers": 6, "observations": ("prompt", "inertial")}
 ROUTE, SEED = "1", 3
 
 # A whole route with the expert in a process of its own, and what comes of it

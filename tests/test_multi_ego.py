@@ -22,12 +22,13 @@ with warnings.catch_warnings():  # its tests import a game of its own in a way i
 
 GO = np.array([0.7, 0.0, 0.0], np.float32)
 STAND = np.array([0.0, 0.0, 1.0], np.float32)
-QUIET = {"suite": "toy", "traffic": 0, "walkers": 0}
+GROUPS = ("prompt", "inertial")  # quick: what the egos do does not depend on them
+QUIET = {"suite": "toy", "traffic": 0, "walkers": 0, "observations": GROUPS}
 
 
 @pytest.fixture(scope="module")
 def pair():
-    return di_envs.parallel_env(egos=2, suite="toy", traffic=6, walkers=3)
+    return di_envs.parallel_env(2, suite="toy", traffic=6, walkers=3, observations=GROUPS)
 
 
 def starts(env):
@@ -52,7 +53,8 @@ def test_pettingzoos_seed_test_passes():
 
 
 def test_one_ego_alone_is_a_route_env_bit_for_bit():
-    one, route = MultiEgoEnv(1, suite="toy"), RouteEnv(suite="toy")
+    options = {"suite": "toy", "observations": GROUPS}
+    one, route = MultiEgoEnv(1, **options), RouteEnv(**options)
     for seed in (4, None):
         observations, infos = one.reset(seed=seed)
         assert data_equivalence(
@@ -126,7 +128,7 @@ def later(plan, points):
 
 def one_behind_the_other(points, **options):
     """Two egos on one route, the second so many points (metres) ahead of the first."""
-    env = MultiEgoEnv(2, **QUIET, **options)
+    env = MultiEgoEnv(2, **QUIET | options)
     env.reset(seed=2)
     plan = env.plan_of("ego_0")
     env.world.reset(2, [plan, later(plan, points)])

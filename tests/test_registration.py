@@ -135,6 +135,10 @@ def test_lists_of_names_become_tuples_as_json_has_only_lists():
     assert set(config.observations) <= set(OBSERVATION_GROUPS)
 
 
+def test_without_a_word_an_environment_shows_cameras_lidar_and_prompt():
+    assert RouteEnvConfig(suite="toy").observations == ("camera", "lidar", "prompt")
+
+
 def test_a_tenth_of_a_second_is_two_world_ticks():
     assert RouteEnvConfig(suite="toy").control_ticks == 2
     assert RouteEnvConfig(suite="toy", control_dt_s=0.15).control_ticks == 3

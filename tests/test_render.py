@@ -21,11 +21,13 @@ from di_envs.vector_env import RouteVectorEnv
 
 GO = np.array([0.7, 0.0, 0.0], np.float32)
 CENTRE = MAP_PX // 2
+GROUPS = ("prompt", "inertial")  # quick: the panel has a test of its camera
+QUIET = {"traffic": 0, "walkers": 0, "observations": GROUPS}
 
 
 @pytest.fixture(scope="module")
 def env():
-    made = RouteEnv(suite="toy", traffic=8, walkers=4, render_mode="rgb_array")
+    made = RouteEnv(suite="toy", traffic=8, walkers=4, observations=GROUPS, render_mode="rgb_array")
     yield made
     made.close()
 
@@ -75,7 +77,7 @@ def test_the_route_ahead_is_drawn_where_it_lies_and_not_behind(started):
 
 
 def test_a_stop_line_has_the_colour_of_its_light():
-    town = RouteEnv(suite="town05_tiny", traffic=0, walkers=0, render_mode="rgb_array")
+    town = RouteEnv(suite="town05_tiny", render_mode="rgb_array", **QUIET)
     seen = set()
     for seed in range(12):
         town.reset(seed=seed)
@@ -181,12 +183,12 @@ def test_the_prompt_in_words_names_all_nine_components(env):
 
 
 def test_frames_a_second_follow_from_the_time_between_decisions():
-    env = RouteEnv(suite="toy", control_dt_s=0.05, traffic=0, walkers=0)
+    env = RouteEnv(suite="toy", control_dt_s=0.05, **QUIET)
     assert env.metadata["render_fps"] == 20
 
 
 def test_without_a_mode_rendering_warns_and_gives_nothing():
-    env = RouteEnv(suite="toy", traffic=0, walkers=0)
+    env = RouteEnv(suite="toy", **QUIET)
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.render()
     env.reset(seed=1)
@@ -202,13 +204,13 @@ def test_an_unknown_mode_is_refused_with_a_suggestion():
 
 
 def test_each_world_and_each_ego_has_a_picture_of_its_own():
-    worlds = RouteVectorEnv(2, suite="toy", traffic=0, walkers=0, render_mode="rgb_array")
+    worlds = RouteVectorEnv(2, suite="toy", render_mode="rgb_array", **QUIET)
     worlds.reset(seed=1, options={"route": 0})
-    alone = RouteEnv(suite="toy", traffic=0, walkers=0, render_mode="rgb_array")
+    alone = RouteEnv(suite="toy", render_mode="rgb_array", **QUIET)
     alone.reset(seed=1, options={"route": 0})
     frames = worlds.render()
     assert np.array_equal(frames[0], alone.render())
-    egos = di_envs.parallel_env(2, suite="toy", traffic=0, walkers=0, render_mode="rgb_array")
+    egos = di_envs.parallel_env(2, suite="toy", render_mode="rgb_array", **QUIET)
     egos.reset(seed=1)
     assert near(egos.render()[CENTRE, CENTRE], EGO)
     assert not np.array_equal(egos.render("ego_0"), egos.render("ego_1"))

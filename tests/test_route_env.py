@@ -16,17 +16,18 @@ from di_envs.world.state import EventKind
 
 FULL_THROTTLE = np.array([1.0, 0.0, 0.0], np.float32)
 STAND = np.array([0.0, 0.0, 1.0], np.float32)
+GROUPS = ("prompt", "inertial")  # quick: pictures have tests of their own
 
 
 @pytest.fixture(scope="module")
 def env():
-    return RouteEnv(suite="toy")
+    return RouteEnv(suite="toy", observations=GROUPS)
 
 
 @pytest.fixture(scope="module")
 def empty():
     """Nobody else on the road, decisions every second."""
-    return RouteEnv(suite="toy", traffic=0, walkers=0, control_dt_s=1.0)
+    return RouteEnv(suite="toy", traffic=0, walkers=0, control_dt_s=1.0, observations=GROUPS)
 
 
 def run(env, action, **reset):
@@ -197,7 +198,7 @@ def test_an_episode_that_is_over_is_not_stepped_on(empty):
 
 
 def test_terminate_on_ends_an_episode_at_its_first_such_event():
-    options = {"suite": "toy", "traffic": 0, "walkers": 0}
+    options = {"suite": "toy", "traffic": 0, "walkers": 0, "observations": GROUPS}
     seed = {"seed": 0, "options": {"route": "0"}}
     kinds = [
         event.kind.name.lower()

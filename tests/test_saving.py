@@ -20,8 +20,11 @@ from di_envs.testing import check_environment, drive
 GO = np.array([0.5, 0.0, 0.0], np.float32)
 
 
+GROUPS = ("prompt", "inertial")  # quick: what is saved does not depend on them
+
+
 def raw():
-    return RouteEnv(suite="toy")
+    return RouteEnv(suite="toy", observations=GROUPS)
 
 
 class SpeedStack(gymnasium.ObservationWrapper):
@@ -55,7 +58,8 @@ class Odometer(gymnasium.Wrapper):
 
 
 def wrapped():
-    env = TimeLimit(RecordEpisodeStatistics(gymnasium.make("DriveInsight-Toy-v0")), 1000)
+    made = gymnasium.make("DriveInsight-Toy-v0", observations=GROUPS)
+    env = TimeLimit(RecordEpisodeStatistics(made), 1000)
     env = NormalizeReward(FrameStackObservation(SpeedStack(env), 3))
     return TransformReward(Odometer(env), lambda reward: reward)
 
@@ -106,7 +110,7 @@ def test_a_snapshot_of_before_the_first_reset_has_no_episode():
 
 
 def test_an_ended_episode_is_restored_as_ended():
-    env = RouteEnv(suite="toy", traffic=0, walkers=0, control_dt_s=5.0)
+    env = RouteEnv(suite="toy", traffic=0, walkers=0, control_dt_s=5.0, observations=GROUPS)
     env.reset(seed=0, options={"route": "0"})
     begun = di_envs.save(env)
     while not any(env.step(np.zeros(3, np.float32))[2:4]):

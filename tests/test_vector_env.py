@@ -17,6 +17,7 @@ N = 3
 # the first drives as fast as it can and soon leaves its route, the others are cut off
 ACTIONS = np.array([[1.0, 0.0, 0.0], [0.6, 0.3, 0.0], [0.5, -0.2, 0.0]], np.float32)
 LIMIT = 70
+GROUPS = ("prompt", "inertial")  # quick: cameras have a test of their own
 
 
 def make_pair(mode, threads, **options):
@@ -38,7 +39,7 @@ def make_pair(mode, threads, **options):
 
 @pytest.fixture(scope="module")
 def env():
-    made = RouteVectorEnv(2, suite="toy", traffic=4, walkers=2, threads=1)
+    made = RouteVectorEnv(2, suite="toy", traffic=4, walkers=2, threads=1, observations=GROUPS)
     yield made
     made.close()
 
@@ -46,7 +47,7 @@ def env():
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_two_hundred_steps_are_those_of_single_environments(mode, threads):
-    ours, theirs = make_pair(mode, threads)
+    ours, theirs = make_pair(mode, threads, observations=GROUPS)
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space
     assert data_equivalence(ours.reset(seed=11), theirs.reset(seed=11), exact=True)
@@ -77,7 +78,7 @@ def test_cameras_in_threads_see_what_those_of_single_environments_see():
 
 
 def test_without_autoreset_the_caller_resets_those_of_a_mask():
-    ours, theirs = make_pair(AutoresetMode.DISABLED, 2)
+    ours, theirs = make_pair(AutoresetMode.DISABLED, 2, observations=GROUPS)
     ours.reset(seed=[5, 6, 7])
     theirs.reset(seed=[5, 6, 7])
     for _ in range(150):
@@ -125,7 +126,7 @@ def test_worlds_share_their_town_and_tables_and_nothing_that_changes(env):
 
 
 def test_a_twin_knows_nothing_of_the_episode_of_the_first():
-    first = RouteEnv(suite="toy", traffic=4, walkers=2)
+    first = RouteEnv(suite="toy", traffic=4, walkers=2, observations=GROUPS)
     first.reset(seed=3)
     twin = first.twin()
     with pytest.raises(gymnasium.error.ResetNeeded):

@@ -16,7 +16,7 @@ from di_envs.world.world import Event, WorldView
 
 def drive(agent_name: str, route: int, look: Callable[[WorldView], None]) -> list[Event]:
     """Drives a route of town05_long to its end and returns its events."""
-    env: Any = gymnasium.make("DriveInsight-Town05Long-v0").unwrapped
+    env: Any = gymnasium.make("DriveInsight-Town05Long-v0", observations=("prompt",)).unwrapped
     agent = load_agent(agent_name)
     observation, _ = env.reset(seed=route, options={"route": route})
     memory = agent.start(env.plan, route)
