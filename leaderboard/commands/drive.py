@@ -1,0 +1,66 @@
+"""`driveinsight drive`: drives one route while somebody watches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
+from leaderboard.commands.scene_arguments import SceneArguments, says
+
+DRIVE_HELP = """Drive one route and watch: its events, its score, and a video if wanted.
+
+Examples:
+  driveinsight drive --agent expert --suite town05_long --route 3
+  driveinsight drive --agent expert --suite town05_long --route 3 --video out.mp4
+  driveinsight drive --agent path/to/mine.py:MyAgent --suite town05_tiny --video out.gif
+
+The drive is the one that `evaluate` scores for this route and seed, bit for bit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive(SceneArguments):
+    """The arguments of `driveinsight drive`."""
+
+    route: Annotated[str | None, says("ID", "the first")] = None
+    """Id of the route to drive."""
+
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Which seed's world to drive in."""
+
+    video: Annotated[Path | None, says("FILE", "none")] = None
+    """Write a video: .mp4, .mkv, .mov, or .gif."""
+
+    no_camera: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Leave the front camera out of the video."""
+
+    def run(self) -> int:
+        """Drives; returns the exit code."""
+        options, _ = self.choose(() if self.route is None else (self.route,))
+
+        from leaderboard.drive import drive, record_lines
+        from leaderboard.jobs import RunSpec
+        from leaderboard.record import SIMULATION_CRASHED
+        from leaderboard.video import VideoError, check_video
+        from leaderboard.warm_up import SetupError
+
+        spec = RunSpec(agent=self.agent, options=options, rules=self.rules)
+        try:
+            if self.video is not None:
+                check_video(self.video)
+            record = drive(
+                spec,
+                route_id=self.route,
+                seed=self.seed,
+                console=Console(stderr=True),
+                video=self.video,
+                camera=not self.no_camera,
+            )
+        except (SetupError, VideoError) as error:
+            raise UsageError(str(error)) from error
+        say(*record_lines(record), *([] if self.video is None else [f"Written: {self.video}"]))
+        return EXIT_CRASHED if record.status == SIMULATION_CRASHED else 0

@@ -1,0 +1,25 @@
+"""How a command can end: exit codes, and the error that is one line for the user."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+
+EXIT_CRASHED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+
+class UsageError(Exception):
+    """What the user asked for cannot be done; one line that says what to do instead."""
+
+
+def complain(message: str, kind: str = "[red]error[/red]") -> None:
+    """Prints one line on stderr: the kind, then the message."""
+    line = " ".join(message.split())
+    Console(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
+
+
+def say(*lines: object) -> None:
+    """Prints lines on stdout as they are: paths and commands that can be copied whole."""
+    Console().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)

@@ -1,0 +1,79 @@
+"""The arguments that say who drives where, shared by the commands that drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from leaderboard.commands.ending import UsageError
+
+if TYPE_CHECKING:
+    from di_envs.suites import Suite
+
+# Those below that are options of the environment; the agent is not
+_OPTIONS = ("suite", "town", "routes", "signals", "traffic", "walkers", "weather", "rules")
+
+
+def says(metavar: str, default: str = "") -> Any:
+    """How an option's value and its default read in the help."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=default and f"(default: {default})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneArguments:
+    """Who drives where, among whom and by which rules."""
+
+    agent: Annotated[str, tyro.conf.arg(metavar="AGENT")]
+    """A name (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
+
+    suite: Annotated[str | None, says("NAME")] = None
+    """A shipped set of routes (see `driveinsight suites`); needless with --routes."""
+
+    town: Annotated[str | None, says("NAME|FILE", "the suite's")] = None
+    """A shipped town's name or an OpenDRIVE file."""
+
+    routes: Annotated[str | None, says("FILE", "the suite's")] = None
+    """A route file in CARLA's XML."""
+
+    signals: Annotated[str | None, says("NAME|FILE", "the map's")] = None
+    """For maps without signals: a sidecar file, a shipped one's name, or `synthesise`."""
+
+    traffic: Annotated[int | None, says("N", "the suite's")] = None
+    """Number of other vehicles."""
+
+    walkers: Annotated[int | None, says("N", "the suite's")] = None
+    """Number of walkers."""
+
+    weather: Annotated[str | None, says("NAME", "the suite's")] = None
+    """One of CARLA's presets, such as HardRainNoon; seen by cameras."""
+
+    rules: Annotated[str, says("NAME", "carla-1.0")] = "carla-1.0"
+    """Name of the scoring rules."""
+
+    def choose(self, route_ids: tuple[str, ...] = ()) -> tuple[dict[str, Any], Suite]:
+        """The environment's options and the suite, checked as far as goes without its town.
+
+        Args:
+            route_ids: Drive these alone; all when empty.
+
+        Raises:
+            UsageError: If an option is wrong, with what to do.
+        """
+        from di_envs.config import RouteEnvConfig
+        from di_envs.suites import choose_suite
+
+        given = {name: getattr(self, name) for name in _OPTIONS}
+        options = {name: value for name, value in given.items() if value is not None}
+        if route_ids:
+            options["route_ids"] = route_ids
+        try:
+            RouteEnvConfig.from_mapping(options)
+            suite = choose_suite(
+                self.suite, town=self.town, routes=self.routes, signals=self.signals
+            )
+            suite.specs(route_ids=route_ids or None)
+        except (ValueError, OSError) as error:
+            raise UsageError(str(error)) from error
+        return options, suite
