@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from di_envs.sensors.camera_config import Rig, rig_of
-from di_envs.sensors.lidar_config import LidarConfig, lidar_of
+from di_envs.sensors.lidar_config import SWEEP_S, LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
 
 OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar")
@@ -145,6 +145,11 @@ class RouteEnvConfig:
     def control_ticks(self) -> int:
         """World ticks for which an action is held."""
         return round(self.control_dt_s / TICK_S)
+
+    @property
+    def half_sweeps(self) -> bool:
+        """Whether steps are so short that each sees half a turn of the LiDAR."""
+        return self.control_ticks < round(SWEEP_S / TICK_S)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:

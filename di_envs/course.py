@@ -76,7 +76,10 @@ class Course:
 
     def observation_space(self) -> spaces.Dict:
         """The space of what an ego sees."""
-        return observation_space(self.config.observations, self.config.cameras, self.config.lidar)
+        config = self.config
+        return observation_space(
+            config.observations, config.cameras, config.lidar, half_sweeps=config.half_sweeps
+        )
 
     def observer(self) -> Observer:
         """Looks at a world through the first ego's eyes; `of_ego` makes those of others."""
@@ -86,6 +89,7 @@ class Course:
             config.observations,
             cameras=config.cameras,
             lidar=config.lidar,
+            half_sweeps=config.half_sweeps,
             weather=config.weather,
         )
 

@@ -71,7 +71,11 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
 
 
 def observation_space(
-    groups: tuple[str, ...], cameras: str | Rig = "small", lidar: str | LidarConfig = "paper"
+    groups: tuple[str, ...],
+    cameras: str | Rig = "small",
+    lidar: str | LidarConfig = "paper",
+    *,
+    half_sweeps: bool = False,
 ) -> spaces.Dict:
     """The space of the groups asked for.
 
@@ -92,6 +96,7 @@ def observation_space(
 
     Group `lidar`: `lidar` (rays, 4) x, y, z in the ego's frame [m] and intensity of each ray's hit,
     zeros for rays that hit nothing or were dropped; and what else is asked for (see `LidarConfig`).
+    With `half_sweeps` it has the rows of the half that the tick scanned (see `sensors/lidar.py`).
     """
     space: dict[str, spaces.Space[Any]] = {}
     if "prompt" in groups:
@@ -106,18 +111,19 @@ def observation_space(
     if "camera" in groups:
         space.update(_image_spaces(rig_of(cameras)))
     if "lidar" in groups:
-        space.update(_lidar_spaces(lidar_of(lidar)))
+        space.update(_lidar_spaces(lidar_of(lidar), half_sweeps))
     return spaces.Dict(space)
 
 
-def _lidar_spaces(config: LidarConfig) -> dict[str, spaces.Space[Any]]:
+def _lidar_spaces(config: LidarConfig, half_sweeps: bool) -> dict[str, spaces.Space[Any]]:
     far = np.float32(config.reach_m)
-    high = np.tile(np.array([far, far, far, 1.0], np.float32), (config.rays, 1))
+    rays = config.channels * (config.half_steps if half_sweeps else config.steps)
+    high = np.tile(np.array([far, far, far, 1.0], np.float32), (rays, 1))
     low = -high
     low[:, 3] = 0.0
     points: dict[str, spaces.Space[Any]] = {"lidar": spaces.Box(low, high, dtype=np.float32)}
     if config.semantic:
-        points["lidar_semantic"] = spaces.Box(0, max(Tag), (config.rays,), np.uint8)
+        points["lidar_semantic"] = spaces.Box(0, max(Tag), (rays,), np.uint8)
     return points
 
 
@@ -178,6 +184,7 @@ class Observer:
         *,
         cameras: str | Rig = "small",
         lidar: str | LidarConfig = "paper",
+        half_sweeps: bool = False,
         weather: str | None = None,
     ) -> None:
         """Prepares to look.
@@ -188,11 +195,13 @@ class Observer:
             ego: Index of the ego that looks.
             cameras: Its rig, or the name of a shipped one; for group `camera`.
             lidar: Its LiDAR, or the name of a shipped one; for group `lidar`.
+            half_sweeps: It looks at every tick, so it sees half a turn of the LiDAR each time.
             weather: What cameras see, one of CARLA's presets; None for ClearNoon.
         """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
         self._rig = rig_of(cameras) if "camera" in groups else None
         self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
+        self._half_sweeps = half_sweeps
         self._weather = weather_of(weather or "ClearNoon")
         self._ego, self._town = ego, town
         self._stop_lines = stop_lines_of(town.signals)
@@ -226,7 +235,9 @@ class Observer:
             self._cameras.start(view)
         self._lidar: Lidar | None = None
         if self._lidar_config is not None:
-            self._lidar = Lidar(self._town, self._lidar_config, self._ego)
+            self._lidar = Lidar(
+                self._town, self._lidar_config, self._ego, half_sweeps=self._half_sweeps
+            )
             self._lidar.start(view)
 
     def observe(self) -> dict[str, Any]:

@@ -1,9 +1,12 @@
 """LiDAR by configuration: channels, rays, range, mounting; the sensors that are shipped.
 
 A sweep is taken at one instant, from the ego's present pose: 10 sweeps a second at the default
-control step of 0.1 s, without the smear of a turning sensor. Channels are spread evenly from
-`upper_deg` down to `lower_deg`; in azimuth a sweep starts straight ahead and turns clockwise, seen
-from above. Ray `step * channels + channel` is the one of that step in azimuth, channel 0 on top.
+control step of 0.1 s, without the smear of a turning sensor. An environment that steps at 0.05 s
+sees half a sweep at a time (see `lidar.py`), one that steps less often the latest whole sweep.
+
+Channels are spread evenly from `upper_deg` down to `lower_deg`; in azimuth a sweep starts straight
+ahead and turns clockwise, seen from above. Ray `step * channels + channel` is the one of that step
+in azimuth, channel 0 on top.
 
 Source: attributes and their defaults are those of CARLA's `sensor.lidar.ray_cast`; range and mount
 follow the Leaderboard's agent wrapper and TransFuser's (Chitta et al., PAMI 2023) sensor set-up.
@@ -17,6 +20,7 @@ import math
 from dataclasses import dataclass
 
 LARGEST_SIDE = 8192
+SWEEP_S = 0.1  # time of a turn, as the Leaderboard sets it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +93,11 @@ class LidarConfig:
     def rays(self) -> int:
         """Rays of a sweep, the rows of the observation."""
         return self.channels * self.steps
+
+    @property
+    def half_steps(self) -> int:
+        """Steps of half a sweep, which is what one world tick scans; rounded up."""
+        return (self.steps + 1) // 2
 
     @property
     def reach_m(self) -> float:

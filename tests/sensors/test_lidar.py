@@ -259,6 +259,41 @@ def test_hits_agree_with_the_depth_and_tags_that_the_camera_shows(busy, number):
     assert same / total >= 0.99
 
 
+def test_each_tick_scans_the_half_of_the_sweep_that_is_its_turn(busy):
+    """Of 175 steps an odd tick sees 0 to 87, an even one 87 to 174, as a whole sweep shows them."""
+    config = LidarConfig(semantic=True, noise_m=0.02)
+    whole, half = Lidar(busy.town, config), Lidar(busy.town, config, half_sweeps=True)
+    for _ in range(3):
+        whole.start(busy.view)
+        half.start(busy.view)
+        odd = int(busy.view.state.tick) % 2 == 1
+        rows = slice(0, 88 * 32) if odd else slice(87 * 32, None)
+        expected, found = whole.observe(), half.observe()
+        assert found["lidar"].shape == (2816, 4)
+        assert (found["lidar"] == expected["lidar"][rows]).all()
+        assert (found["lidar_semantic"] == expected["lidar_semantic"][rows]).all()
+        side = found["lidar"][found["lidar"][:, 3] > 0.0][:, 1].astype(np.float64)
+        # to the right at odd ticks, y being right; step 87 is 1 degree before straight behind
+        assert (side if odd else -side).min() > -85.0 * math.sin(math.radians(1.1))
+        busy.advance(np.zeros((0, 3)), 1)
+
+
+@pytest.mark.parametrize(
+    ("control_dt_s", "rows"), [(0.05, 2816), (0.1, 5600), (0.15, 5600), (0.5, 5600)]
+)
+def test_an_environment_of_20_hz_sees_half_sweeps_and_slower_ones_whole_ones(control_dt_s, rows):
+    env = gymnasium.make("DriveInsight-Toy-v0", observations=("lidar",), control_dt_s=control_dt_s)
+    seen, _ = env.reset(seed=1)
+    for expected_tick in range(2):
+        assert seen["lidar"].shape == env.observation_space["lidar"].shape == (rows, 4)
+        assert env.observation_space.contains(seen)
+        points = seen["lidar"][seen["lidar"][:, 3] > 0.0]
+        if rows == 2816:
+            right = (points[:, 1] > 0.0).mean()
+            assert (right > 0.98) if expected_tick == 1 else (right < 0.02)
+        seen = env.step(np.array([0.0, 0.0, 1.0], np.float32))[0]
+
+
 def nearest_by_brute_force(world, config):
     """Range of every ray (steps, channels) against the plane and each box, in double precision."""
     boxes, state = box_buffer(), world.view.state
