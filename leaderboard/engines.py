@@ -105,7 +105,7 @@ def _receive(worker: _Worker) -> RouteRecord:
     try:
         record: RouteRecord = worker.connection.recv()
     except (EOFError, OSError):
-        from leaderboard.episode import lost_record
+        from leaderboard.episode_log import lost_record
 
         worker.process.join()
         return lost_record(job, f"the worker process {_death(worker.process.exitcode)}")

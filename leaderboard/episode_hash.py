@@ -8,24 +8,29 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from di_envs.world.world import Event
 
 _EVENT = struct.Struct("<4q4d")
 _REWARD = struct.Struct("<d")
+_CHECK_BYTES = 4
 
 
 class EpisodeHash:
-    """Three running BLAKE2b digests of 128 bits, fed step by step."""
+    """Three running BLAKE2b digests of 128 bits, fed step by step, and a short one a look."""
 
     def __init__(self) -> None:
         self._observations = hashlib.blake2b(digest_size=16)
         self._rewards = hashlib.blake2b(digest_size=16)
         self._events = hashlib.blake2b(digest_size=16)
+        self._checks = bytearray()
 
     def add_observation(self, observation: Mapping[str, Any]) -> None:
         """Adds every array, in the dict's order, bytes only: spaces fix the shapes."""
-        self._observations.update(b"".join([_bytes_of(array) for array in observation.values()]))
+        digest = observation_digest(observation)
+        self._observations.update(digest)
+        self._checks += digest[:_CHECK_BYTES]
 
     def add_reward(self, reward: float) -> None:
         self._rewards.update(_REWARD.pack(reward))
@@ -41,6 +46,21 @@ class EpisodeHash:
             self._rewards.hexdigest(),
             self._events.hexdigest(),
         )
+
+    def checks(self) -> NDArray[np.uint32]:
+        """(N,) one short hash for each observation so far; see `observation_check`."""
+        return np.frombuffer(bytes(self._checks), "<u4")
+
+
+def observation_digest(observation: Mapping[str, Any]) -> bytes:
+    """16 bytes of BLAKE2b over every array of an observation, in its order."""
+    parts = b"".join([_bytes_of(array) for array in observation.values()])
+    return hashlib.blake2b(parts, digest_size=16).digest()
+
+
+def observation_check(observation: Mapping[str, Any]) -> int:
+    """32 bits that tell one observation from another: what a record keeps of each."""
+    return int.from_bytes(observation_digest(observation)[:_CHECK_BYTES], "little")
 
 
 def _bytes_of(value: Any) -> Any:

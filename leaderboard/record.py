@@ -8,16 +8,30 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from di_envs.world.state import EventKind
+from leaderboard.packing import unpack
 from leaderboard.score import Score
 
 # CARLA's statuses of routes that code ended, not driving
 NOT_SET_UP = "Failed - Agent couldn't be set up"
 AGENT_CRASHED = "Failed - Agent crashed"
 SIMULATION_CRASHED = "Failed - Simulation crashed"
+
+CONTROL_TYPE = "<f4"  # of the numbers packed in `RouteRecord.controls`
+CHECK_TYPE = "<u4"  # of those in `RouteRecord.observation_checks`
+TRACE_S = 0.5  # between two rows of a trace
+
+# time [s], x, y, z [m], yaw [rad], speed [m/s] of the ego, rounded to three decimals
+TraceRow = tuple[float, float, float, float, float, float]
+
+
+_NO_CONTROLS: NDArray[np.float32] = np.zeros((0, 3), np.float32)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +78,11 @@ class RouteRecord:
         travelled_m: Route metres over which metres outside lanes were counted.
         wall_s: Wall-clock time that it took; the only thing here that a rerun changes.
         observation_hash: BLAKE2b of every observation in order; so the other two.
+        interventions: What was done to the world or to what the agent saw, as text.
+        scenarios: How many scenarios of each type were triggered.
+        controls: Every control carried out, packed; see `control_array`.
+        observation_checks: A short hash of every observation, packed; see `check_array`.
+        trace: Where the ego was, every half second and at the end.
     """
 
     route_id: str
@@ -86,6 +105,25 @@ class RouteRecord:
     observation_hash: str
     reward_hash: str
     event_hash: str
+    interventions: tuple[str, ...] = ()
+    scenarios: Mapping[str, int] = field(default_factory=dict)
+    controls: str = ""
+    observation_checks: str = ""
+    trace: tuple[TraceRow, ...] = ()
+
+    def control_array(self) -> NDArray[np.float32]:
+        """(N, 3) throttle, steer, brake of every decision. ValueError if they are damaged."""
+        return unpack(self.controls, CONTROL_TYPE, 3) if self.controls else _NO_CONTROLS
+
+    def check_array(self) -> NDArray[np.uint32]:
+        """(N + 1,) `observation_check` of what the agent saw before each decision, and at the end.
+
+        Raises:
+            ValueError: If they are damaged.
+        """
+        if not self.observation_checks:
+            return np.zeros(0, np.uint32)
+        return unpack(self.observation_checks, CHECK_TYPE, 1)[:, 0]
 
     @property
     def crashed(self) -> bool:

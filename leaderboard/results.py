@@ -1,18 +1,26 @@
-"""Result files: CARLA's `results.json` and, beside it, our fuller `driveinsight.json`.
+"""Result files of a run: one for the run, one a route, and CARLA's `results.json` beside them.
 
-Both are replaced in one step, so a reader never sees half a file. Ours says all that a rerun needs
-to give the same bits: agent, options, seeds, versions, CPU capability, town and routes.
+    RUN/driveinsight.json   what was asked for: agent, options, seeds, rules, versions, CPU, town
+    RUN/routes/0007.json    one route driven once, whole: score, events, controls, trace, hashes
+    RUN/results.json        the table of all routes so far, in CARLA's schema
+
+The run's file is written once and each route's once, so a run of a thousand routes writes no more
+for the last than for the first. Every file is replaced in one step: a reader, or whoever resumes
+after a kill, finds a route whole or not at all. A route's file names the run it belongs to by a
+hash of the run's file, so routes of two runs are never counted together.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from di_envs.world.state import EventKind
 from leaderboard.carla_results import carla_results
@@ -21,8 +29,12 @@ from leaderboard.score import Score
 
 CARLA_FILE = "results.json"
 RECORD_FILE = "driveinsight.json"
+ROUTES_FOLDER = "routes"
 FORMAT = "driveinsight-run"
-FORMAT_VERSION = 1
+ROUTE_FORMAT = "driveinsight-route"
+FORMAT_VERSION = 2
+
+_Value = TypeVar("_Value")
 
 
 class ResultsError(Exception):
@@ -44,33 +56,107 @@ def prepare_folder(folder: Path, *, overwrite: bool = False) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
+        if overwrite:
+            _remove_results(folder)
     except OSError as error:
         raise ResultsError(
             f"cannot write results to {folder} ({error.strerror}): choose another --output"
         ) from error
 
 
+def _remove_results(folder: Path) -> None:
+    """Takes away an earlier run, its routes last: what is left if that fails is no run at all."""
+    for name in (RECORD_FILE, CARLA_FILE):
+        (folder / name).unlink(missing_ok=True)
+    for path in route_files(folder):
+        path.unlink(missing_ok=True)
+
+
+def route_files(folder: Path) -> list[Path]:
+    """The files of those routes of a run that are finished, by their index."""
+    return sorted((folder / ROUTES_FOLDER).glob("[0-9]*.json"), key=lambda path: int(path.stem))
+
+
 def write_run(folder: Path, run: RunRecord) -> None:
-    """Writes both files of a run, whole or in progress.
+    """Writes a run with all its routes.
 
     Raises:
         ResultsError: If the folder cannot be written to.
     """
+    start_run(folder, run)
+    for record in run.routes:
+        _write(folder, partial(_write_route, folder, run, record))
+
+
+def start_run(folder: Path, run: RunRecord) -> None:
+    """Writes a run's own file and CARLA's, but no route.
+
+    Raises:
+        ResultsError: If the folder cannot be written to.
+    """
+    _write(folder, lambda: _write_json(folder / RECORD_FILE, run_to_json(run)))
+    write_table(folder, run)
+
+
+def add_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
+    """Writes one more route of a run that was started, then CARLA's table.
+
+    Args:
+        folder: The run's.
+        run: The run, of which `record` is already one of `routes`.
+        record: The route just finished.
+
+    Raises:
+        ResultsError: If the folder cannot be written to.
+    """
+    _write(folder, partial(_write_route, folder, run, record))
+    write_table(folder, run)
+
+
+def write_table(folder: Path, run: RunRecord) -> None:
+    """Writes CARLA's `results.json`, which is made of the rest.
+
+    Raises:
+        ResultsError: If the folder cannot be written to.
+    """
+    _write(folder, lambda: _write_json(folder / CARLA_FILE, carla_results(run)))
+
+
+def _write(folder: Path, write: Callable[[], None]) -> None:
     try:
-        _write_json(folder / RECORD_FILE, run_to_json(run))
-        _write_json(folder / CARLA_FILE, carla_results(run))
+        write()
     except OSError as error:
         raise ResultsError(f"cannot write results to {folder} ({error.strerror})") from error
 
 
+def _write_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
+    routes = folder / ROUTES_FOLDER
+    routes.mkdir(exist_ok=True)
+    content = {
+        "format": ROUTE_FORMAT,
+        "format_version": FORMAT_VERSION,
+        "run": run_hash(run),
+        **route_to_json(record),
+    }
+    lines = (f" {json.dumps(key)}: {_compact(value)}" for key, value in content.items())
+    _write_text(routes / f"{record.index:04d}.json", "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    _write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def _write_text(path: Path, text: str) -> None:
     """Writes beside the file, then renames: the file is the old or the new one, never half."""
-    text = json.dumps(content, indent=1, allow_nan=False)
     with tempfile.NamedTemporaryFile(
         "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
     ) as file:
         try:
-            file.write(text + "\n")
+            file.write(text)
             file.flush()
             os.fsync(file.fileno())
             os.chmod(file.name, 0o644)  # temporary files are private, results are not
@@ -80,61 +166,113 @@ def _write_json(path: Path, content: Mapping[str, Any]) -> None:
             raise
 
 
-def read_run(path: Path) -> RunRecord:
-    """Reads a run back from its folder or its `driveinsight.json`.
+def run_folder(path: Path) -> Path:
+    """The folder of a run that is given by it, or by `driveinsight.json` or `results.json` in it.
 
     Raises:
-        ResultsError: If there is no such file, or it is half-written, foreign or of another
-            format version.
+        ResultsError: If there is no run.
     """
-    path = path / RECORD_FILE if path.is_dir() else path
-    if not path.exists():
+    folder = path.parent if path.name in (RECORD_FILE, CARLA_FILE) else path
+    if not (folder / RECORD_FILE).is_file():
         raise ResultsError(
-            f"there is no {path}: give the folder that `driveinsight evaluate --output` wrote"
+            f"there is no {folder / RECORD_FILE}: give the folder that "
+            "`driveinsight evaluate --output` wrote"
         )
+    return folder
+
+
+def read_run(path: Path) -> RunRecord:
+    """Reads a run with all its finished routes.
+
+    Args:
+        path: Its folder, or `driveinsight.json` or `results.json` in it.
+
+    Raises:
+        ResultsError: If there is no such run, or one of its files is half-written, foreign, of
+            another format version, or of another run.
+    """
+    folder = run_folder(path)
+    run = _parsed(folder / RECORD_FILE, FORMAT, run_from_json)
+    owner = run_hash(run)
+    records = []
+    for file in route_files(folder):
+        content = _content(file, ROUTE_FORMAT)
+        if content.get("run") != owner:
+            raise ResultsError(
+                f"{file} belongs to another run than {folder / RECORD_FILE}: put the file of its "
+                "own run there, or remove it and continue with `driveinsight evaluate --resume`"
+            )
+        record = _parse(file, content, route_from_json)
+        if file.stem != f"{record.index:04d}" or record.index >= run.planned:
+            raise ResultsError(f"{file} holds route number {record.index}: it was renamed")
+        records.append(record)
+    return dataclasses.replace(run, routes=tuple(records))
+
+
+def _parsed(path: Path, form: str, parse: Callable[[Mapping[str, Any]], _Value]) -> _Value:
+    return _parse(path, _content(path, form), parse)
+
+
+def _content(path: Path, form: str) -> Mapping[str, Any]:
+    """The JSON object in a file of ours, whose format and version are right."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
-        raise ResultsError(f"{path} is not whole JSON ({error}): evaluate again") from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ResultsError(
-            f"{path} is not a {RECORD_FILE} of ours (its format is not '{FORMAT}'): "
+            f"{path} is not whole JSON ({error}): fetch it again from where it came, or remove it "
+            "and evaluate again"
+        ) from error
+    if not isinstance(content, dict) or content.get("format") != form:
+        raise ResultsError(
+            f"{path} is not a {path.name} of ours (its format is not '{form}'): "
             "give the folder that `driveinsight evaluate --output` wrote"
         )
     if content.get("format_version") != FORMAT_VERSION:
         raise ResultsError(
             f"{path} has format version {content.get('format_version')}, this program reads "
-            f"{FORMAT_VERSION}: evaluate again"
+            f"{FORMAT_VERSION}: evaluate again, or read it with the version that wrote it"
         )
+    return content
+
+
+def _parse(
+    path: Path, content: Mapping[str, Any], parse: Callable[[Mapping[str, Any]], _Value]
+) -> _Value:
     try:
-        return run_from_json(content)
+        return parse(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ResultsError(
             f"{path} lacks or garbles a field ({error!r}): evaluate again"
         ) from error
 
 
+def run_hash(run: RunRecord) -> str:
+    """What a run's routes call it by: a hash of everything but the routes."""
+    text = json.dumps(run_to_json(run), sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
 def run_to_json(run: RunRecord) -> dict[str, Any]:
-    """The run as JSON values."""
+    """The run as JSON values, without its routes."""
     fields = {field.name: getattr(run, field.name) for field in dataclasses.fields(run)}
+    del fields["routes"]
     fields["seeds"] = list(run.seeds)
     fields["requires"] = dict(run.requires)
     fields["options"] = dict(run.options)
     fields["versions"] = dict(run.versions)
-    fields["routes"] = [_route_to_json(record) for record in run.routes]
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **fields}
 
 
 def run_from_json(content: Mapping[str, Any]) -> RunRecord:
-    """The inverse of `run_to_json`."""
-    names = [field.name for field in dataclasses.fields(RunRecord)]
+    """The inverse of `run_to_json`: a run without routes."""
+    names = [field.name for field in dataclasses.fields(RunRecord) if field.name != "routes"]
     values = {name: content[name] for name in names}
     values["seeds"] = tuple(values["seeds"])
-    values["routes"] = tuple(_route_from_json(record) for record in values["routes"])
     return RunRecord(**values)
 
 
-def _route_to_json(record: RouteRecord) -> dict[str, Any]:
+def route_to_json(record: RouteRecord) -> dict[str, Any]:
+    """The route as JSON values."""
     values = dataclasses.asdict(record)
     values["score"]["driving_score"] = record.score.driving_score
     values["events"] = [
@@ -143,20 +281,21 @@ def _route_to_json(record: RouteRecord) -> dict[str, Any]:
     return values
 
 
-def _route_from_json(content: Mapping[str, Any]) -> RouteRecord:
-    score, bound = content["score"], content["bound"]
-    events = tuple(
-        EventRecord(**{**event, "kind": EventKind[event["kind"].upper()]})
-        for event in content["events"]
-    )
+def route_from_json(content: Mapping[str, Any]) -> RouteRecord:
+    """The inverse of `route_to_json`."""
+    values = {field.name: content[field.name] for field in dataclasses.fields(RouteRecord)}
+    score, bound = values["score"], values["bound"]
     kept = Score(
         route_completion=score["route_completion"], infraction_score=score["infraction_score"]
     )
-    return RouteRecord(
-        **{
-            **content,
-            "score": kept,
-            "bound": None if bound is None else Bound(**bound),
-            "events": events,
-        }
+    if score["driving_score"] != kept.driving_score:
+        raise ValueError(f"driving_score {score['driving_score']} is not the product of the others")
+    values["score"] = kept
+    values["bound"] = None if bound is None else Bound(**bound)
+    values["events"] = tuple(
+        EventRecord(**{**event, "kind": EventKind[event["kind"].upper()]})
+        for event in values["events"]
     )
+    values["interventions"] = tuple(values["interventions"])
+    values["trace"] = tuple(tuple(row) for row in values["trace"])
+    return RouteRecord(**values)

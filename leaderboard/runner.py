@@ -24,7 +24,7 @@ from di_envs.suites import Suite
 from leaderboard.engines import Engine, PoolEngine, SerialEngine
 from leaderboard.jobs import Job, RunSpec, plan_jobs
 from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.results import write_run
+from leaderboard.results import add_route, start_run
 from leaderboard.warm_up import Scene, warm_up
 
 # Packages whose version can change a bit of a result
@@ -62,13 +62,13 @@ def evaluate(
         scene = warm_up(spec, console)
         jobs = plan_jobs(scene.route_ids, seeds)
         run = new_run(spec, jobs, suite, scene)
-        write_run(folder, run)
+        start_run(folder, run)
         engine: Engine = SerialEngine() if workers == 1 else PoolEngine(workers=workers)
         try:
             with closing(_driven(engine, spec, jobs, console)) as records:
                 for record in records:
                     run = with_route(run, record)
-                    write_run(folder, run)
+                    add_route(folder, run, record)
         except KeyboardInterrupt:
             console.print(f"interrupted: {len(run.routes)} of {run.planned} routes are kept")
     return run

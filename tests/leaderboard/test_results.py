@@ -22,6 +22,8 @@ from leaderboard.results import (
     ResultsError,
     prepare_folder,
     read_run,
+    route_from_json,
+    route_to_json,
     run_from_json,
     run_to_json,
     write_run,
@@ -202,13 +204,18 @@ def test_a_run_in_which_a_process_died_is_not_eligible():
 @given(sampled_from(list(EventKind)), floats(0.0, 1e4), floats(-1e4, 1e4))
 def test_a_run_comes_back_from_its_file_as_it_was(kind, value, x):
     run = run_of(route(events=(event(kind, value=value, x=x),)), route(index=1, bound=None))
-    assert run_from_json(json.loads(json.dumps(run_to_json(run)))) == run
+    head = run_from_json(json.loads(json.dumps(run_to_json(run))))
+    routes = tuple(
+        route_from_json(json.loads(json.dumps(route_to_json(record)))) for record in run.routes
+    )
+    assert replace(head, routes=routes) == run
 
 
 def test_files_are_written_whole_and_leave_no_scratch_behind(tmp_path):
     write_run(tmp_path, run_of(RED))
     write_run(tmp_path, run_of(RED, route(route_id="8", index=1)))
-    assert sorted(os.listdir(tmp_path)) == [RECORD_FILE, CARLA_FILE]
+    assert sorted(os.listdir(tmp_path)) == [RECORD_FILE, CARLA_FILE, "routes"]
+    assert sorted(os.listdir(tmp_path / "routes")) == ["0000.json", "0001.json"]
     assert len(read_run(tmp_path).routes) == 2
 
 

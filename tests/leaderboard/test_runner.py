@@ -131,7 +131,7 @@ def test_a_run_says_what_a_rerun_needs(tmp_path):
     assert run.track == "PROMPT"
     assert run.options["route_ids"] == [ROUTE]
     assert len(run.town_hash) >= 16
-    assert sorted(os.listdir(tmp_path)) == ["driveinsight.json", "results.json"]
+    assert sorted(os.listdir(tmp_path)) == ["driveinsight.json", "results.json", "routes"]
 
 
 def test_events_carry_time_and_place():
