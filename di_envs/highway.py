@@ -36,7 +36,8 @@ VEHICLES = (
     ActorKind.MOTORCYCLE,
     ActorKind.BICYCLE,
 )
-OFF_ROAD = (ActorKind.ABSENT, ActorKind.PROP)  # props are poles beside the road
+# poles and vending machines stand beside the road, and one drives over debris
+OFF_ROAD = (ActorKind.ABSENT, ActorKind.PROP, ActorKind.DEBRIS, ActorKind.VENDING_MACHINE)
 
 
 def lane_indices(town: Town) -> dict[int, LaneIndex]:
@@ -117,7 +118,7 @@ def to_highway_road(view: WorldView, network: RoadNetwork | None = None) -> Road
     state = view.state
     for actor in range(state.kind.size):
         kind = int(state.kind[actor])
-        if kind in VEHICLES:
+        if kind in VEHICLES and state.lane[actor] >= 0:
             name = names.get(int(state.lane[actor]))
             if name is not None and name[1] in network.graph.get(name[0], {}):
                 road.vehicles.append(to_vehicle(view, actor, road, name))
@@ -151,7 +152,7 @@ def to_vehicle(view: WorldView, actor: int, road: Road, lane_index: LaneIndex) -
 
 
 def to_obstacle(view: WorldView, actor: int) -> Obstacle:
-    """A walker as an obstacle; it is on no lane until somebody looks."""
+    """A walker, or a cyclist who crosses, as an obstacle; on no lane until somebody looks."""
     from highway_env.vehicle.objects import Obstacle
 
     state = view.state

@@ -36,6 +36,9 @@ class Stream(IntEnum):
     RAIN = 15
     LIDAR = 16  # which rays are dropped
     LIDAR_NOISE = 17
+    SCENARIO = 18  # what a trigger brings: keyed by its number in its ego's plan, and the ego
+    STEER_NOISE = 19
+    THROTTLE_NOISE = 20
 
 
 @kernel

@@ -263,7 +263,7 @@ def fill_obstacles(state, ego, pose, z, out):
     chosen = np.empty(OBSTACLES, np.int64)
     count = 0
     for actor in range(state.kind.size):
-        if state.kind[actor] == _ABSENT or state.kind[actor] == _PROP:
+        if state.kind[actor] == _ABSENT or state.kind[actor] >= _PROP:
             continue
         if actor == ego or abs(state.z[actor] - z) > LEVEL_M:
             continue

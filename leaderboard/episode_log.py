@@ -35,6 +35,8 @@ from leaderboard.score import Progress, Score, score_route
 _ACTOR_TYPES: Mapping[int, str] = {
     ActorKind.WALKER: "walker.pedestrian",
     ActorKind.PROP: "static.prop",
+    ActorKind.DEBRIS: "static.prop.dirtdebris01",
+    ActorKind.VENDING_MACHINE: "static.prop.vendingmachine",
 }
 _TRACE_TICKS = round(TRACE_S / TICK_S)
 

@@ -70,6 +70,6 @@ def count_collision(state, ego, other, out, n):
     kind = HIT_VEHICLE
     if state.kind[other] == WALKER:
         kind = HIT_WALKER
-    elif state.kind[other] == PROP:
+    elif state.kind[other] >= PROP:
         kind = HIT_STATIC
     return record(out, n, kind, ego, state.tick[()], x, y, z, other, 0.0)

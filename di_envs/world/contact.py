@@ -24,10 +24,11 @@ PASSES = 3  # pushing an ego out of one body may push it into the next
 DOWN = 2  # walk_waiting of a walker who was knocked down
 
 ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
+DEBRIS = int(ActorKind.DEBRIS)
 
-# 1 / mass [1/kg] by ActorKind; a prop does not move
+# 1 / mass [1/kg] by ActorKind; what is lifeless does not move
 INVERSE_MASS = np.array(
-    [0.0, 1 / 1800, 1 / 2500, 1 / 8000, 1 / 12000, 1 / 250, 1 / 100, 1 / 75, 0.0]
+    [0.0, 1 / 1800, 1 / 2500, 1 / 8000, 1 / 12000, 1 / 250, 1 / 100, 1 / 75, 0.0, 0.0, 0.0]
 )
 
 
@@ -123,6 +124,8 @@ def _resolve_once(state, out, n):
             if not may_touch(state, ego, other):
                 continue
             if state.kind[other] == ABSENT or state.kind[ego] == ABSENT:
+                continue
+            if state.kind[other] == DEBRIS:  # lies flat: wheels go over it
                 continue
             depth, nx, ny = overlap(box_of(state, ego), box_of(state, other))
             if depth <= 0.0:

@@ -8,7 +8,7 @@ from di_envs.kernels import kernel
 # kind, ego, tick, x, y, z, other, value: the fields of `Event`
 COLUMNS = 8
 # at most this many rows an ego and tick: one collision, one stop sign, a red light or two, the
-# metres outside lanes, the end of the route
+# metres outside lanes, the end of the route, a scenario
 ROWS_PER_EGO = 8
 
 
@@ -34,6 +34,6 @@ def record(out, n, kind, ego, tick, x, y, z, other, value):
 
 @kernel
 def count_rows(counts, out, begin, end):
-    """Adds the rows [begin, end) of `out` to the egos' `counts` (E, 12)."""
+    """Adds the rows [begin, end) of `out` to the egos' `counts` (E, EVENT_KINDS)."""
     for k in range(begin, end):
         counts[int(out[k, 1]), int(out[k, 0])] += 1

@@ -8,7 +8,7 @@ TICK_S = 0.05  # of the world: 20 Hz, as in the CARLA Leaderboard
 
 
 class ActorKind(IntEnum):
-    """What an actor is; ABSENT slots hold nobody."""
+    """What an actor is; ABSENT slots hold nobody, PROP and what follows it are lifeless."""
 
     ABSENT = 0
     CAR = 1
@@ -18,11 +18,13 @@ class ActorKind(IntEnum):
     MOTORCYCLE = 5
     BICYCLE = 6
     WALKER = 7
-    PROP = 8
+    PROP = 8  # the pole of a signal
+    DEBRIS = 9  # lies flat on the road and can be driven over
+    VENDING_MACHINE = 10  # what somebody steps out from behind of
 
 
 class EventKind(IntEnum):
-    """What Leaderboard 1.0 counts, and what ends a route."""
+    """What Leaderboard 1.0 counts, what ends a route, and what was put in an ego's way."""
 
     COLLISION_WALKER = 1
     COLLISION_VEHICLE = 2
@@ -34,3 +36,4 @@ class EventKind(IntEnum):
     BLOCKED = 8
     TIMEOUT = 9
     COMPLETED = 10
+    SCENARIO = 11  # one began; value: its type, other: its number among the plan's scenarios

@@ -1,7 +1,8 @@
 """The world's state as a value: one contiguous record a world, with named fields.
 
 Everything that time changes is here, so that to save, hash or branch a world is to copy a row.
-Actors (axis A) have stable ids: the egos first [0, E), then vehicles, then walkers, then props.
+Actors (axis A) have stable ids: the egos first [0, E), then vehicles, then walkers, poles and
+those of scenarios, each with a slot of its own. G counts all egos' scenario triggers, in a row.
 World frame, SI units; stations are along the lane in its direction of travel.
 """
 
@@ -23,6 +24,7 @@ HISTORY_TICKS = 10  # ticks between two of them
 HISTORY_LENGTH = SPEED_HISTORY * HISTORY_TICKS + 1
 OCCUPIED_LANES = 4  # lanes that a free body (an ego, a walker) may lie on at once
 COLLISION_MEMORY = 8  # remembered collision places
+EVENT_KINDS = max(EventKind) + 1  # columns of `counts`
 
 
 @by_reference
@@ -71,11 +73,16 @@ class State(NamedTuple):
     phase_group: NDArray[np.int32]  # group whose turn it is
     phase_ticks: NDArray[np.int32]  # ticks since its green began
     light: NDArray[np.int8]  # (S,) LightState
+    forced_light: NDArray[np.int8]  # (S,) LightState shown whatever the turn, NONE for the turn's
+    held_by: NDArray[np.int32]  # (J,) 1 + trigger that plays with its lights, 0 for none
+    held_until: NDArray[np.int64]  # (J,) tick at which a forced yellow ends
     # egos (E,): controls and progress
     throttle: NDArray[np.float64]  # held control, 0..1
     steer: NDArray[np.float64]  # held control, -1..1, positive right
     brake: NDArray[np.float64]  # held control, 0..1
     wheel: NDArray[np.float64]  # steering that the actuator has reached, -1..1
+    throttle_noise: NDArray[np.float64]  # added to the held control while control is lost
+    steer_noise: NDArray[np.float64]
     speed_history: NDArray[np.float64]  # (E, HISTORY_LENGTH) ring of speeds by tick
     route_index: NDArray[np.int32]  # route point reached
     route_done_m: NDArray[np.float64]  # metres of the dense route completed
@@ -84,6 +91,7 @@ class State(NamedTuple):
         np.int32
     ]  # (E, OCCUPIED_LANES) driving lanes below the ego's box, -1 for none
     finished: NDArray[np.int8]  # EventKind that ended the route, 0 while it goes on
+    nearest_index: NDArray[np.int32]  # route point nearest the ego, which triggers scenarios
     # egos (E,): what the events remember
     last_collision_actor: NDArray[np.int32]
     last_collision_tick: NDArray[np.int64]
@@ -102,7 +110,11 @@ class State(NamedTuple):
     deviation_index: NDArray[np.int32]  # route point that the deviation test follows
     deviation_m: NDArray[np.float64]  # route progress made while more than 15 m off
     blocked_ticks: NDArray[np.int32]
-    counts: NDArray[np.int32]  # (E, 12) events so far, by EventKind
+    counts: NDArray[np.int32]  # (E, EVENT_KINDS) events so far, by EventKind
+    # scenarios (G,)
+    scenario_step: NDArray[np.int8]  # AHEAD, then the steps of its family, then DONE
+    scenario_tick: NDArray[np.int64]  # at which that step began
+    scenario_m: NDArray[np.float64]  # how far its walker or cyclist has crossed
 
 
 class Capacity(NamedTuple):
@@ -114,9 +126,15 @@ class Capacity(NamedTuple):
     props: int
     junctions: int
     signals: int
+    triggers: int = 0
+    scenario_actors: int = 0
 
     @property
     def actors(self) -> int:
+        return self.first_scenario_actor + self.scenario_actors
+
+    @property
+    def first_scenario_actor(self) -> int:
         return self.egos + self.vehicles + self.walkers + self.props
 
 
@@ -125,7 +143,7 @@ _F8, _I8, _I4, _I1, _U8 = "f8", "i8", "i4", "i1", "u8"
 
 def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
     """The record of one world; field order is that of `State`."""
-    actors, egos = (capacity.actors,), (capacity.egos,)
+    actors, egos, triggers = (capacity.actors,), (capacity.egos,), (capacity.triggers,)
     shapes: dict[str, tuple[str, tuple[int, ...]]] = {
         "seed": (_U8, ()),
         "tick": (_I8, ()),
@@ -147,14 +165,18 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         "walk_m": (_F8, actors),
         **dict.fromkeys(("walk_direction", "walk_waiting"), (_I1, actors)),
         **dict.fromkeys(("phase_group", "phase_ticks"), (_I4, (capacity.junctions,))),
-        "light": (_I1, (capacity.signals,)),
+        **dict.fromkeys(("light", "forced_light"), (_I1, (capacity.signals,))),
+        "held_by": (_I4, (capacity.junctions,)),
+        "held_until": (_I8, (capacity.junctions,)),
         **dict.fromkeys(("throttle", "steer", "brake", "wheel"), (_F8, egos)),
+        **dict.fromkeys(("throttle_noise", "steer_noise"), (_F8, egos)),
         "speed_history": (_F8, (*egos, HISTORY_LENGTH)),
         "route_index": (_I4, egos),
         "route_done_m": (_F8, egos),
         "target_index": (_I4, egos),
         "occupied": (_I4, (*egos, OCCUPIED_LANES)),
         "finished": (_I1, egos),
+        "nearest_index": (_I4, egos),
         "last_collision_actor": (_I4, egos),
         "last_collision_tick": (_I8, egos),
         "collision_places": (_F8, (*egos, COLLISION_MEMORY, 2)),
@@ -166,7 +188,10 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         **dict.fromkeys(("outside_index", "deviation_index"), (_I4, egos)),
         "deviation_m": (_F8, egos),
         "blocked_ticks": (_I4, egos),
-        "counts": (_I4, (*egos, 12)),
+        "counts": (_I4, (*egos, EVENT_KINDS)),
+        "scenario_step": (_I1, triggers),
+        "scenario_tick": (_I8, triggers),
+        "scenario_m": (_F8, triggers),
     }
     return np.dtype([(name, *shapes[name]) for name in State._fields], align=True)
 

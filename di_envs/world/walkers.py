@@ -290,7 +290,7 @@ def move_walkers(state, walk, signals, first):
     while end > first and state.kind[end - 1] == PROP:  # they come last
         end -= 1
     for walker in range(first, end):
-        if state.kind[walker] != WALKER:
+        if state.kind[walker] != WALKER or state.walk_edge[walker] < 0:  # a scenario's own
             continue
         if state.walk_waiting[walker] == DOWN:
             _lie(state, walker)
@@ -307,7 +307,9 @@ def mark_busy_crosswalks(state, walk, busy):
     busy[:] = 0
     kind, walk_edge, walk_m = state.kind, state.walk_edge, state.walk_m
     for walker in range(kind.size):
-        if kind[walker] != WALKER or walk.crosswalk[walk_edge[walker]] < 0:
+        if kind[walker] != WALKER or walk_edge[walker] < 0:
+            continue
+        if walk.crosswalk[walk_edge[walker]] < 0:
             continue
         edge, direction = walk_edge[walker], state.walk_direction[walker]
         kerb, _begin, end = _road_part(walk, edge, direction)

@@ -36,7 +36,7 @@ from di_envs.world.traffic_tables import traffic_tables
 from di_envs.world.walk_graph import build_walk_graph
 from di_envs.world.walkers import spawn_walkers
 
-STATE_VERSION = "1"  # of the record's layout and meaning; a snapshot of another is refused
+STATE_VERSION = "2"  # of the record's layout and meaning; a snapshot of another is refused
 
 
 @dataclass(frozen=True, kw_only=True)

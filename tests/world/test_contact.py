@@ -32,7 +32,7 @@ def depth(state):
 
 
 def energy(state):
-    movable = (state.kind != ActorKind.ABSENT) & (state.kind != ActorKind.PROP)
+    movable = (state.kind != ActorKind.ABSENT) & (state.kind < ActorKind.PROP)
     kinds = state.kind[movable]
     return 0.5 * float(np.sum(state.speed[movable] ** 2 / INVERSE_MASS[kinds]))
 
@@ -54,6 +54,17 @@ def test_a_prop_stops_the_ego_at_once_and_stays():
     assert list(state.speed) == [0.0, 0.0]
     assert state.x[1] == 2.7
     assert state.x[0] == pytest.approx(2.2 - HALF - SLOP_M)
+
+
+def test_a_vending_machine_is_hit_and_debris_is_driven_over():
+    state = make_state(props=1)
+    state.speed[0] = 10.0
+    put(state, 1, ActorKind.DEBRIS, 2.7, 0.0, half_length=0.5, half_width=0.5)
+    assert meet(state) == []
+    assert list(state.speed) == [10.0, 0.0]
+    state.kind[1] = ActorKind.VENDING_MACHINE
+    assert meet(state) == [EventKind.COLLISION_STATIC]
+    assert list(state.speed) == [0.0, 0.0]
 
 
 def test_full_throttle_does_not_get_an_ego_through_a_prop():
@@ -180,7 +191,7 @@ def test_full_event_rows_are_refused():
         resolve_contacts(state, np.zeros((0, 8)), 0)
 
 
-KINDS = [kind for kind in ActorKind if kind != ActorKind.ABSENT]
+KINDS = [kind for kind in ActorKind if kind not in (ActorKind.ABSENT, ActorKind.DEBRIS)]
 
 
 @settings(max_examples=200, deadline=None)
@@ -195,7 +206,7 @@ KINDS = [kind for kind in ActorKind if kind != ActorKind.ABSENT]
 def test_a_contact_makes_no_energy_and_leaves_no_overlap(kind, x, y, yaw, ego_speed, speed):
     state = make_state(vehicles=1)
     state.speed[0] = ego_speed
-    put(state, 1, kind, x, y, yaw=yaw, speed=0.0 if kind == ActorKind.PROP else speed)
+    put(state, 1, kind, x, y, yaw=yaw, speed=0.0 if kind >= ActorKind.PROP else speed)
     before = energy(state)
     meet(state)
     assert energy(state) <= before * (1.0 + 1e-12)
