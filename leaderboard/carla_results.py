@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from di_envs.world.state import EventKind
-from leaderboard.record import EventRecord, RouteRecord, RunRecord
+from leaderboard.record import SIMULATION_CRASHED, EventRecord, RouteRecord, RunRecord
 from leaderboard.score import INFRACTIONS, infractions_per_km, mean_score, share_of_distance
 
 # (event, key of its list, label of its rate), in the order of `values` and `labels`
@@ -42,8 +42,8 @@ _SENSORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def carla_results(run: RunRecord) -> dict[str, Any]:
     """The content of CARLA's `results.json` for this run, as JSON values."""
     records = [_route(record) for record in run.routes]
-    whole = _global(run.routes, records) if records else {}
-    values, labels = _table(whole) if records else ([], [])
+    whole = _global(run.scored, records) if run.scored else {}
+    values, labels = _table(whole) if whole else ([], [])
     return {
         "_checkpoint": {
             "global_record": whole,
@@ -51,7 +51,7 @@ def carla_results(run: RunRecord) -> dict[str, Any]:
             "records": records,
         },
         "entry_status": _entry_status(run),
-        "eligible": run.complete and not run.simulation_crashed,
+        "eligible": run.complete and not run.lost,
         "sensors": _sensors(run),
         "values": values,
         "labels": labels,
@@ -61,7 +61,7 @@ def carla_results(run: RunRecord) -> dict[str, Any]:
 def _entry_status(run: RunRecord) -> str:
     if not run.complete:
         return "Finished with missing data" if run.routes else "Started"
-    if run.simulation_crashed:
+    if run.lost:
         return "Crashed"
     if any("Agent" in record.status for record in run.routes):
         return "Finished with agent errors"
@@ -81,7 +81,7 @@ def _route(record: RouteRecord) -> dict[str, Any]:
     return {
         "route_id": f"RouteScenario_{record.route_id}",
         "index": record.index,
-        "status": record.status,
+        "status": SIMULATION_CRASHED if record.lost else record.status,
         "infractions": infractions,
         "scores": {
             "score_route": record.score.route_completion,

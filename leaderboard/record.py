@@ -22,6 +22,11 @@ from leaderboard.score import Score
 NOT_SET_UP = "Failed - Agent couldn't be set up"
 AGENT_CRASHED = "Failed - Agent crashed"
 SIMULATION_CRASHED = "Failed - Simulation crashed"
+# Ours, for routes whose worker process died, and those that took too long by the clock on the wall
+WORKER_DIED = "Failed - Worker died"
+OUT_OF_TIME = "Failed - Wall-clock limit"
+# What says nothing of the driving: such routes are left out of every mean and every pair
+LOST = frozenset({SIMULATION_CRASHED, WORKER_DIED, OUT_OF_TIME})
 
 CONTROL_TYPE = "<f4"  # of the numbers packed in `RouteRecord.controls`
 CHECK_TYPE = "<u4"  # of those in `RouteRecord.observation_checks`
@@ -130,6 +135,11 @@ class RouteRecord:
         """Whether code failed, the agent's or the simulator's, rather than the driving."""
         return bool(self.reason)
 
+    @property
+    def lost(self) -> bool:
+        """Whether the machinery failed: the record says nothing of the driving."""
+        return self.status in LOST
+
     def fingerprint(self) -> tuple[Any, ...]:
         """All that a rerun must give again, bit for bit."""
         values = dataclasses.asdict(dataclasses.replace(self, wall_s=0.0))
@@ -169,6 +179,11 @@ class RunRecord:
         return len(self.routes) == self.planned
 
     @property
-    def simulation_crashed(self) -> bool:
-        """Whether a route is lost to a fault that is not the agent's."""
-        return any(record.status == SIMULATION_CRASHED for record in self.routes)
+    def scored(self) -> tuple[RouteRecord, ...]:
+        """The routes that were driven: what means, rates and pairs are made of."""
+        return tuple(record for record in self.routes if not record.lost)
+
+    @property
+    def lost(self) -> tuple[RouteRecord, ...]:
+        """The routes that the machinery failed to drive, and their reasons."""
+        return tuple(record for record in self.routes if record.lost)

@@ -38,8 +38,9 @@ def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int])
 
 def run_tables(run: RunRecord) -> Group:
     """The leaderboard table of a run, its infractions by kind, and what they rest on."""
-    if not run.routes:
-        return Group(Text("no route was finished: there is nothing to show"))
+    if not run.scored:
+        lost = [Text(line) for line in _lost_lines(run)]
+        return Group(Text("no route was finished: there is nothing to show"), *lost)
     return Group(_route_table(run), _infraction_table(run), Text(_caption(run), style="dim"))
 
 
@@ -56,9 +57,8 @@ def _route_table(run: RunRecord) -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("what happened", overflow="fold")
     for route_id in dict.fromkeys(record.route_id for record in run.routes):
-        table.add_row(
-            escape(route_id), *_cells([r for r in run.routes if r.route_id == route_id], run)
-        )
+        records = [record for record in run.routes if record.route_id == route_id]
+        table.add_row(escape(route_id), *_cells(records, run))
     table.add_section()
     table.add_row("mean", *_mean_cells(run), style="bold")
     return table
@@ -66,20 +66,23 @@ def _route_table(run: RunRecord) -> Table:
 
 def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
     """DS, RC, IS, bound, infractions per km and a summary, over the seeds of one route."""
-    scores = [record.score for record in records]
+    driven = [record for record in records if not record.lost]
+    if not driven:
+        return ["-"] * 5 + [escape(_summary(records))]
+    scores = [record.score for record in driven]
     return [
         f"{_mean([score.driving_score for score in scores]):.1f}",
         f"{_mean([score.route_completion for score in scores]):.1f}",
         f"{_mean([score.infraction_score for score in scores]):.2f}",
-        _bound_cell(records),
-        f"{_scored_per_km(records, run):.2f}",
+        _bound_cell(driven),
+        f"{_scored_per_km(driven, run):.2f}",
         escape(_summary(records)),
     ]
 
 
 def _mean_cells(run: RunRecord) -> list[str]:
-    completion = mean_interval(seed_means(run.routes, "route_completion", run.seeds))
-    penalty = mean_interval(seed_means(run.routes, "infraction_score", run.seeds))
+    completion = mean_interval(seed_means(run.scored, "route_completion", run.seeds))
+    penalty = mean_interval(seed_means(run.scored, "infraction_score", run.seeds))
     penalty_text = f"{penalty.mean:.2f}"
     if penalty.half_width is not None:
         penalty_text += f" ± {penalty.half_width:.2f}"
@@ -87,15 +90,15 @@ def _mean_cells(run: RunRecord) -> list[str]:
         str(driving_interval(run)),
         str(completion),
         penalty_text,
-        _bound_cell(run.routes),
-        f"{_scored_per_km(run.routes, run):.2f}",
+        _bound_cell(run.scored),
+        f"{_scored_per_km(run.scored, run):.2f}",
         "",
     ]
 
 
 def driving_interval(run: RunRecord) -> Interval:
     """The run's mean DS, with the t-interval of its means by seed."""
-    return mean_interval(seed_means(run.routes, "driving_score", run.seeds))
+    return mean_interval(seed_means(run.scored, "driving_score", run.seeds))
 
 
 def mean_bound(records: Iterable[RouteRecord]) -> float | None:
@@ -123,11 +126,19 @@ def _scored_per_km(records: Sequence[RouteRecord], run: RunRecord) -> float:
 
 def _summary(records: Sequence[RouteRecord]) -> str:
     """What went wrong, counted: `2 red light, 1 timeout, 1 agent crashed`."""
-    kinds = count_infractions(event.kind for record in records for event in record.events)
+    driven = [record for record in records if not record.lost]
+    kinds = count_infractions(event.kind for record in driven for event in record.events)
     parts = [f"{count} {SHORT_NAMES[kind]}" for kind, count in kinds.items() if count]
-    crashes = Counter(record.status for record in records if record.crashed)
-    parts += [f"{count} {status.removeprefix('Failed - ')}" for status, count in crashes.items()]
+    crashes = Counter(record.status for record in driven if record.crashed)
+    parts += [f"{count} {_plain_status(status)}" for status, count in crashes.items()]
+    lost = Counter(record.status for record in records if record.lost)
+    parts += [f"{count} lost ({_plain_status(status)})" for status, count in lost.items()]
     return ", ".join(parts)
+
+
+def _plain_status(status: str) -> str:
+    """A status without the word that they share: `Worker died`."""
+    return status.removeprefix("Failed - ")
 
 
 def _infraction_table(run: RunRecord) -> Table:
@@ -135,19 +146,19 @@ def _infraction_table(run: RunRecord) -> Table:
     table.add_column("kind")
     table.add_column("count", justify="right")
     table.add_column("per km", justify="right")
-    driven_m = math.fsum(record.done_m for record in run.routes)
-    kinds = count_infractions(event.kind for record in run.routes for event in record.events)
+    driven_m = math.fsum(record.done_m for record in run.scored)
+    kinds = count_infractions(event.kind for record in run.scored for event in record.events)
     for kind, count in kinds.items():
         table.add_row(SHORT_NAMES[kind], str(count), f"{infractions_per_km(count, driven_m):.3f}")
     return table
 
 
 def _caption(run: RunRecord) -> str:
-    routes = len({record.route_id for record in run.routes})
-    driven_km = math.fsum(record.done_m for record in run.routes) / 1000.0
-    seeds = len({record.seed for record in run.routes})
+    routes = len({record.route_id for record in run.scored})
+    driven_km = math.fsum(record.done_m for record in run.scored) / 1000.0
+    seeds = len({record.seed for record in run.scored})
     if seeds == 1:
-        doubt = f"one seed ({run.routes[0].seed}): no confidence interval"
+        doubt = f"one seed ({run.scored[0].seed}): no confidence interval"
     else:
         doubt = f"± is the 95 % t-interval of the means of {seeds} seeds"
     lines = [
@@ -156,4 +167,15 @@ def _caption(run: RunRecord) -> str:
     ]
     if not run.complete:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_lost_lines(run)])
+
+
+def _lost_lines(run: RunRecord) -> list[str]:
+    """That routes are left out, and how to drive them after all."""
+    if not run.lost:
+        return []
+    return [
+        f"Left out of every mean: {len(run.lost)} of {run.planned} routes x seeds, lost to the "
+        "machinery and not to the driving.",
+        "To drive them after all: the same command with --resume.",
+    ]

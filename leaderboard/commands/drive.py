@@ -44,7 +44,6 @@ class Drive(SceneArguments):
 
         from leaderboard.drive import drive, record_lines
         from leaderboard.jobs import RunSpec
-        from leaderboard.record import SIMULATION_CRASHED
         from leaderboard.video import VideoError, check_video
         from leaderboard.warm_up import SetupError
 
@@ -63,4 +62,4 @@ class Drive(SceneArguments):
         except (SetupError, VideoError) as error:
             raise UsageError(str(error)) from error
         say(*record_lines(record), *([] if self.video is None else [f"Written: {self.video}"]))
-        return EXIT_CRASHED if record.status == SIMULATION_CRASHED else 0
+        return EXIT_CRASHED if record.lost else 0

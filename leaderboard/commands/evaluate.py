@@ -76,7 +76,7 @@ class Evaluate(SceneArguments):
         _print_run(run, folder)
         if not run.complete:
             return EXIT_INTERRUPTED
-        return EXIT_CRASHED if run.simulation_crashed else 0
+        return EXIT_CRASHED if run.lost else 0
 
 
 def _plain(name: str) -> str:

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from di_envs.world.state import EventKind
 from leaderboard.carla_results import carla_results
-from leaderboard.record import Bound, EventRecord, RouteRecord, RunRecord
+from leaderboard.record import LOST, Bound, EventRecord, RouteRecord, RunRecord
 from leaderboard.report import driving_interval, run_tables
 from leaderboard.results import (
     CARLA_FILE,
@@ -194,11 +194,31 @@ def test_a_run_cut_short_is_not_eligible_and_says_so():
     assert carla_results(run_of(planned=4))["entry_status"] == "Started"
 
 
-def test_a_run_in_which_a_process_died_is_not_eligible():
-    died = route(status="Failed - Simulation crashed", reason="the worker process was killed")
-    content = carla_results(run_of(died, route(index=1)))
+LOST_SCORE = Score(route_completion=0.0, infraction_score=1.0)
+
+
+def lost(status: str) -> RouteRecord:
+    reason = "the worker was killed by SIGKILL"
+    return route("8", index=1, status=status, reason=reason, score=LOST_SCORE, done_m=0.0)
+
+
+@pytest.mark.parametrize("status", sorted(LOST))
+def test_a_lost_route_makes_a_run_ineligible_and_is_in_no_mean(status):
+    content = carla_results(run_of(route(), lost(status)))
     assert content["entry_status"] == "Crashed"
     assert content["eligible"] is False
+    assert content["_checkpoint"]["records"][1]["status"] == "Failed - Simulation crashed"
+    assert content["_checkpoint"]["global_record"]["scores"]["score_composed"] == 100.0
+
+
+@pytest.mark.parametrize("status", sorted(LOST))
+def test_a_lost_route_stands_apart_in_the_table(status):
+    run = run_of(route(), lost(status))
+    text = _text(run)
+    assert f"1 lost ({status.removeprefix('Failed - ')})" in text
+    assert "Left out of every mean: 1 of 2 routes x seeds" in text
+    assert driving_interval(run).mean == 100.0
+    assert "--resume" in _text(run_of(lost(status)))
 
 
 @given(sampled_from(list(EventKind)), floats(0.0, 1e4), floats(-1e4, 1e4))
