@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import di_envs  # noqa: F401 (registers the ids)
+from di_envs.config import OBSERVATION_GROUPS
 from di_envs.route_env import RouteEnv
 from di_envs.vector_env import RouteVectorEnv
 
@@ -63,8 +64,10 @@ def test_two_hundred_steps_are_those_of_single_environments(mode, threads):
     theirs.close()
 
 
-def test_cameras_in_threads_see_what_those_of_single_environments_see():
-    ours, theirs = make_pair(AutoresetMode.NEXT_STEP, 2, observations=("camera", "inertial"))
+def test_sensors_in_threads_see_what_those_of_single_environments_see():
+    """All of them, in a rainy night."""
+    options = {"observations": OBSERVATION_GROUPS, "weather": "HardRainNight"}
+    ours, theirs = make_pair(AutoresetMode.NEXT_STEP, 2, **options)
     assert data_equivalence(ours.reset(seed=4), theirs.reset(seed=4), exact=True)
     for _ in range(12):
         step = ours.step(ACTIONS)

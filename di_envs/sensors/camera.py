@@ -6,6 +6,7 @@ A rig collects what stands round its ego once, and each of its cameras paints th
 
 from __future__ import annotations
 
+import zlib
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,8 @@ class CameraRig:
         self._scene = scene_of(town)
         self._look = look_of(weather)
         self._boxes, self._seen = box_buffer(), projected_buffer()
+        # rain is keyed by the camera's name: another one beside it changes none of its drops
+        self._keys = [zlib.crc32(camera.name.encode()) for camera in rig.cameras]
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays."""
@@ -65,7 +68,7 @@ class CameraRig:
         images: dict[str, NDArray[Any]] = {}
         for number, camera in enumerate(self.rig.cameras):
             canvas = self._fresh(self._canvases[number])
-            self._render(self._studio, canvas, self._ego, number)
+            self._render(self._studio, canvas, self._ego, self._keys[number])
             images[camera.name] = canvas.rgb.reshape(camera.height, camera.width, 3)
             if self.rig.depth:
                 images[f"{camera.name}_depth"] = canvas.depth

@@ -22,14 +22,14 @@ F = np.float32
 
 
 @kernel
-def render(studio, canvas, ego, number):
+def render(studio, canvas, ego, key):
     """Takes the images of one camera.
 
     Args:
         studio: `Studio`; its boxes were collected before.
         canvas: `Canvas` of the camera, written.
         ego: The ego's index.
-        number: The camera's number, for its own rain.
+        key: The camera's own, for its own rain.
     """
     height, width = canvas.depth.shape
     scene, look, seen = studio.scene, studio.look, studio.seen
@@ -41,7 +41,7 @@ def render(studio, canvas, ego, number):
         _row(studio, canvas, y, boxes[start[y] : start[y + 1]])
     add_glow(studio.boxes, seen, canvas.cam, canvas.depth, canvas.rgb)
     if look.numbers[4] > 0.0:
-        add_rain(studio.state, number, look.numbers[4], canvas.rgb)
+        add_rain(studio.state, key, look.numbers[4], canvas.rgb)
 
 
 @kernel

@@ -64,11 +64,11 @@ def _disc(x, y, size, strength, colour, rgb):
 
 
 @kernel
-def add_rain(state, number, rain, rgb):
+def add_rain(state, key, rain, rgb):
     """Draws streaks of rain, other ones in every tick and camera."""
     height, width = rgb.shape[0], rgb.shape[1] // 3
     for drop in range(int(rain * width * height * _STREAKS * min(1.0, 400.0 / height))):
-        draw = keyed_hash(state.seed[()], _RAIN, state.tick[()], number * 1000000 + drop)
+        draw = keyed_hash(state.seed[()], _RAIN, state.tick[()], key * 1000000 + drop)
         x = float(draw & np.uint64(0xFFFF)) / 65536.0 * width
         y = float((draw >> np.uint64(16)) & np.uint64(0xFFFF)) / 65536.0 * height
         near = float((draw >> np.uint64(32)) & np.uint64(0xFF)) / 256.0
