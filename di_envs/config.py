@@ -70,6 +70,8 @@ class RouteEnvConfig:
         routes: Path of a route file in CARLA's XML.
         route_ids: Ids of the routes to use; None for all.
         signals: Sidecar file or shipped name of a town's signals, or `synthesise`.
+        scenarios: Name of a shipped trigger file, path of one in CARLA's JSON or of a folder of
+            them, several with commas between, or `none`.
         observations: Groups of observations: `camera`, `lidar`, `prompt`, `inertial`. Each camera
             costs its time, so name what is needed: `("prompt",)` alone steps many times faster.
         traffic: Number of other vehicles.
@@ -90,6 +92,7 @@ class RouteEnvConfig:
     routes: str | None = None
     route_ids: tuple[str, ...] | None = None
     signals: str | None = None
+    scenarios: str | None = None
     observations: tuple[str, ...] = ("camera", "lidar", "prompt")
     traffic: int | None = None
     walkers: int | None = None

@@ -137,7 +137,11 @@ def load_course(options: Mapping[str, Any]) -> Course:
     """
     config = RouteEnvConfig.from_mapping(options)
     suite = choose_suite(
-        config.suite, town=config.town, routes=config.routes, signals=config.signals
+        config.suite,
+        town=config.town,
+        routes=config.routes,
+        signals=config.signals,
+        scenarios=config.scenarios,
     )
     vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
     walkers = suite.traffic.walkers if config.walkers is None else config.walkers

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -17,9 +17,12 @@ from di_envs.town.plan import RoutePlan
 from di_envs.town.road_graph import build_road_graph
 from di_envs.town.router import MAX_SNAP_M, plan_route
 from di_envs.town.routes import RouteSpec, read_routes
+from di_envs.town.scenarios import with_scenarios
 from di_envs.town.town import Town
+from di_envs.town.trigger_files import PlacedScenario, read_triggers
 
 DATA = Path(__file__).resolve().parent / "town" / "data"
+NO_SCENARIOS = "none"  # in place of a trigger file
 TIMEOUT_RULES = ("carla-1.0",)  # int(0.8 s/m x length + 5 s), see RoutePlan.timeout_s
 
 
@@ -47,6 +50,8 @@ class Suite:
         town: Name of a shipped town, or path of an OpenDRIVE file.
         routes: Name of a shipped route file, or path of one.
         signals: As `load_town` takes it; None for those in the map.
+        scenarios: Name of a shipped trigger file, path of one or of a folder of them, or several
+            paths with commas between; None for no scenarios.
         timeout_rule: Name of the rule for the route timeout.
         weather: Name of one of CARLA's presets.
         traffic: How many others there are.
@@ -59,6 +64,7 @@ class Suite:
     town: str
     routes: str
     signals: str | None = None
+    scenarios: str | None = None
     timeout_rule: str = "carla-1.0"
     weather: str = "ClearNoon"
     traffic: TrafficLevel = TrafficLevel(vehicles=120, walkers=60)
@@ -96,6 +102,17 @@ class Suite:
         """The OpenDRIVE file."""
         return _shipped(self.town, DATA, ".xodr")
 
+    @property
+    def scenario_paths(self) -> tuple[Path, ...]:
+        """The trigger files, or folders of them; none where there are no scenarios."""
+        if self.scenarios is None:
+            return ()
+        whole = _shipped(self.scenarios, DATA / "scenarios", ".json")
+        if whole.exists():
+            return (whole,)
+        names = [name.strip() for name in self.scenarios.split(",")]
+        return tuple(_shipped(name, DATA / "scenarios", ".json") for name in names)
+
     def specs(
         self, town: str | None = None, route_ids: Sequence[str] | None = None
     ) -> list[RouteSpec]:
@@ -126,10 +143,13 @@ class Suite:
             route_ids: Plan only these, in the order of the file; None plans all.
 
         Raises:
-            ValueError: As `specs`, and if a route cannot be planned (`RouteError`).
+            ValueError: As `specs`, if a route cannot be planned (`RouteError`), and if a trigger
+                file is broken (`TriggerFileError`).
         """
         graph = build_road_graph(town)
-        return tuple(
+        specs = self.specs(town.name, route_ids)
+        placed = self.placed_scenarios({town.name, *(spec.town for spec in specs)})
+        plans = (
             plan_route(
                 town,
                 spec.positions,
@@ -137,8 +157,18 @@ class Suite:
                 graph=graph,
                 max_snap_m=self.max_snap_m,
             )
-            for spec in self.specs(town.name, route_ids)
+            for spec in specs
         )
+        return tuple(with_scenarios(plan, placed) for plan in plans)
+
+    def placed_scenarios(self, towns: Collection[str]) -> tuple[PlacedScenario, ...]:
+        """The scenarios placed in a town, wherever its names are found.
+
+        Raises:
+            TriggerFileError: If a trigger file is broken, or is for other towns only.
+        """
+        paths = self.scenario_paths
+        return read_triggers(paths, towns) if paths else ()
 
 
 def suite_names() -> tuple[str, ...]:
@@ -163,6 +193,7 @@ def choose_suite(
     town: str | Path | None = None,
     routes: str | Path | None = None,
     signals: str | None = None,
+    scenarios: str | None = None,
 ) -> Suite:
     """The suite that a user asks for, by name, by files, or by a name with files in its place.
 
@@ -172,6 +203,8 @@ def choose_suite(
         routes: Name of a shipped route file, or route file, instead of the suite's.
         signals: As `load_town` takes it, instead of the suite's. Another town does not inherit the
             suite's signals.
+        scenarios: Name of a shipped trigger file, path of one or of a folder of them, instead of
+            the suite's, or `none`. Another town does not inherit the suite's scenarios.
 
     Raises:
         ValueError: If the name is unknown, if there is neither a name nor both files, or if a file
@@ -186,17 +219,26 @@ def choose_suite(
     chosen = load_suite(suite) if suite is not None else _own_files()
     changes: dict[str, Any] = {}
     if town is not None:
-        changes |= {"town": str(town), "signals": None}
+        changes |= {"town": str(town), "signals": None, "scenarios": None}
     if routes is not None:
         changes |= {"routes": str(routes), "name": Path(routes).stem}
     if changes:
         changes |= {"version": 0, "max_snap_m": MAX_SNAP_M}
     if signals is not None:
         changes["signals"] = signals
+    if scenarios is not None:
+        changes["scenarios"] = None if scenarios == NO_SCENARIOS else str(scenarios)
     chosen = dataclasses.replace(chosen, **changes)
     for path in (chosen.town_path, chosen.routes_path):
         if not path.is_file():
             raise ValueError(f"There is no file '{path}'; check the path.")
+    for path in chosen.scenario_paths:
+        if not path.exists():
+            shipped = ", ".join(sorted(path.stem for path in (DATA / "scenarios").glob("*.json")))
+            raise ValueError(
+                f"There is no trigger file or folder '{path}'; check the path. Shipped: {shipped}; "
+                f"'{NO_SCENARIOS}' turns scenarios off."
+            )
     return chosen
 
 

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from di_envs.suites import Suite
 
 # Those below that are options of the environment; the agent is not
-_OPTIONS = ("suite", "town", "routes", "signals", "traffic", "walkers", "weather", "rules")
+_OPTIONS = (
+    *("suite", "town", "routes", "signals", "scenarios"),
+    *("traffic", "walkers", "weather", "rules"),
+)
 
 
 def says(metavar: str, default: str = "") -> Any:
@@ -39,6 +42,9 @@ class SceneArguments:
 
     signals: Annotated[str | None, says("NAME|FILE", "the map's")] = None
     """For maps without signals: a sidecar file, a shipped one's name, or `synthesise`."""
+
+    scenarios: Annotated[str | None, says("NAME|FILE|DIR|none", "the suite's")] = None
+    """CARLA trigger files of the Leaderboard's scenarios; `none` drives without."""
 
     traffic: Annotated[int | None, says("N", "the suite's")] = None
     """Number of other vehicles."""
@@ -71,7 +77,11 @@ class SceneArguments:
         try:
             RouteEnvConfig.from_mapping(options)
             suite = choose_suite(
-                self.suite, town=self.town, routes=self.routes, signals=self.signals
+                self.suite,
+                town=self.town,
+                routes=self.routes,
+                signals=self.signals,
+                scenarios=self.scenarios,
             )
             suite.specs(route_ids=route_ids or None)
         except (ValueError, OSError) as error:
