@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from rich.markup import escape
 from rich.table import Table
 
 from agents import AGENTS, load_agent
-from di_envs.suites import load_suite, suite_names
+from di_envs.suites import Suite, load_suite, suite_names
+from di_envs.town.loading import load_town
+from di_envs.town.scenarios import STAGED
 
 
 def agent_table() -> Table:
@@ -50,3 +54,21 @@ def suite_table() -> Table:
 
 
 _NUMBERS = ("version", "routes", "vehicles", "walkers")
+
+
+def scenario_table() -> Table:
+    """How many scenarios of each type the routes of the shipped suites meet."""
+    table = Table(title="scenarios along the routes", title_justify="left", title_style="bold")
+    table.add_column("suite")
+    for number in STAGED:
+        table.add_column(f"S{number}", justify="right")
+    for suite in map(load_suite, suite_names()):
+        if suite.scenarios is not None:
+            counts = _scenarios_met(suite)
+            table.add_row(suite.name, *(str(counts[number]) for number in STAGED))
+    return table
+
+
+def _scenarios_met(suite: Suite) -> Counter[int]:
+    plans = suite.plans(load_town(suite.town_path, suite.signals))
+    return Counter(trigger.type for plan in plans for trigger in plan.scenarios)

@@ -225,3 +225,28 @@ def test_a_shipped_route_off_its_lane_would_be_noticed(town05: Town) -> None:
     shifted = dataclasses.replace(load_suite("town05_short"), max_snap_m=0.0)
     with pytest.raises(RouteError, match="keypoint 0"):
         shifted.plans(town05)
+
+
+def test_scenarios_are_the_suites_the_users_or_none(tmp_path: Path) -> None:
+    shipped = choose_suite("town05_long").scenario_paths
+    assert [path.name for path in shipped] == ["town05.json"]
+    assert choose_suite("town05_long", scenarios="none").scenario_paths == ()
+    assert choose_suite("town05_tiny").scenario_paths == ()
+    assert choose_suite("toy", scenarios="toy").scenario_paths[0].name == "toy.json"
+    assert choose_suite("town05_long", town="toy").scenario_paths == ()  # those of another town
+    (tmp_path / "a.json").touch()
+    both = f"{tmp_path / 'a.json'}, {tmp_path}"
+    assert choose_suite("toy", scenarios=both).scenario_paths == (tmp_path / "a.json", tmp_path)
+    with pytest.raises(
+        ValueError, match=r"no trigger file or folder 'town5'.*Shipped: town05, toy"
+    ):
+        choose_suite("toy", scenarios="town5")
+
+
+def test_plans_of_a_suite_hold_the_scenarios_of_their_town() -> None:
+    suite = choose_suite("toy", scenarios="toy")
+    town = load_town(suite.town_path)
+    met = [trigger.type for plan in suite.plans(town) for trigger in plan.scenarios]
+    assert sorted(met) == [1, 1, 3, 4, 4, 4, 4, 7, 7, 9, 10, 10, 10]
+    with pytest.raises(ValueError, match="no scenario is placed in toy; its towns: Town05"):
+        choose_suite("toy", scenarios="town05").plans(town)

@@ -22,7 +22,8 @@ Examples:
   driveinsight evaluate --agent expert --suite town05_long --seeds 3 --workers 2
   driveinsight evaluate --agent path/to/mine.py:MyAgent --suite town05_tiny --route-ids 0 3
   driveinsight evaluate --agent expert --town Town05.xodr --signals town05 \\
-      --routes routes_town05_long.xml
+      --routes routes_town05_long.xml --scenarios scenarios/
+  driveinsight evaluate --agent expert --suite town05_long --scenarios none
 
 Writes results.json (CARLA's schema) and driveinsight.json (everything) into --output."""
 

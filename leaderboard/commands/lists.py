@@ -31,11 +31,12 @@ class Suites:
 
     def run(self) -> int:
         """Prints the list; returns the exit code."""
-        from leaderboard.listing import suite_table
+        from leaderboard.listing import scenario_table, suite_table
 
         Console().print(
             suite_table(),
-            "Your own: --town FILE.xodr --routes FILE.xml (CARLA's formats).",
+            scenario_table(),
+            "Your own: --town FILE.xodr --routes FILE.xml --scenarios FILE.json (CARLA's formats).",
             "Next: driveinsight evaluate --agent expert --suite town05_short",
             sep="\n",
             highlight=False,
