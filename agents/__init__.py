@@ -9,6 +9,7 @@ import difflib
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -58,6 +59,15 @@ AGENTS: dict[str, AgentEntry] = {
     ),
 }
 
+# What stands before a colon: how the file that follows it is driven. A module of such a name can
+# still be reached by a longer one, or by its file.
+SCHEMES: dict[str, AgentEntry] = {
+    "carla": AgentEntry(
+        entry_point="agents.carla:CarlaAgent",
+        summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
+    ),
+}
+
 _CONTRACT = ("requires", "start", "act", "close")
 
 
@@ -69,7 +79,8 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     """Makes the agent that `spec` names.
 
     Args:
-        spec: A name of `AGENTS`, or `module:Class`, or `path/to/file.py:Class`.
+        spec: A name of `AGENTS`, or `module:Class`, or `path/to/file.py:Class`, or
+            `scheme:file?option=value&option=value` with a scheme of `SCHEMES`.
         options: Keyword arguments of the agent's class; they override the table's.
 
     Raises:
@@ -78,9 +89,27 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     entry = AGENTS.get(spec)
     if entry is not None:
         return _make(spec, entry.entry_point, {**entry.options, **options})
+    scheme, _, place = spec.partition(":")
+    if scheme in SCHEMES:
+        entry = SCHEMES[scheme]
+        path, said = _place_and_options(spec, place)
+        return _make(spec, entry.entry_point, {**entry.options, "path": path, **said, **options})
     if ":" not in spec:
         raise AgentSpecError(_unknown_name(spec))
     return _make(spec, spec, options)
+
+
+def _place_and_options(spec: str, place: str) -> tuple[str, dict[str, str]]:
+    """A file and what is said of it: `weights.zip?device=cpu` is `weights.zip`, device: cpu."""
+    path, _, query = place.partition("?")
+    options = dict(part.partition("=")[::2] for part in query.split("&") if part)
+    for name, value in options.items():
+        if not name.isidentifier() or not value:
+            raise AgentSpecError(
+                f"agent '{spec}': expected option=value after the '?', joined by '&'; got "
+                f"'{query}'."
+            )
+    return path, options
 
 
 def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]:
@@ -92,8 +121,10 @@ def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]
         raise AgentSpecError(
             f"agent '{spec}': {place} has no class '{class_name}'; {_hint(class_name, known)}"
         )
+    _check_options(spec, found, options)
     agent: Agent[Any] = found(**options)
-    missing = [name for name in _CONTRACT if not hasattr(agent, name)]
+    # on the class first: what an agent requires may take it long to find out
+    missing = [n for n in _CONTRACT if not hasattr(found, n) and not hasattr(agent, n)]
     if missing:
         raise AgentSpecError(
             f"agent '{spec}': {class_name} lacks {', '.join(missing)}; an agent has "
@@ -102,9 +133,20 @@ def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]
     return agent
 
 
+def _check_options(spec: str, found: type, options: Mapping[str, Any]) -> None:
+    parameters = inspect.signature(found).parameters
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
+        return
+    for name in options:
+        if name not in parameters:
+            raise AgentSpecError(
+                f"agent '{spec}': there is no option '{name}'; {_hint(name, list(parameters))}"
+            )
+
+
 def _module_of(spec: str, place: str) -> ModuleType:
     if place.endswith(".py"):
-        return _module_of_file(spec, Path(place))
+        return module_of_file(spec, Path(place))
     try:
         return importlib.import_module(place)
     except ModuleNotFoundError as error:
@@ -116,7 +158,12 @@ def _module_of(spec: str, place: str) -> ModuleType:
         ) from None
 
 
-def _module_of_file(spec: str, path: Path) -> ModuleType:
+def module_of_file(spec: str, path: Path) -> ModuleType:
+    """Imports a Python file, once.
+
+    Raises:
+        AgentSpecError: If there is none. Whatever the file's own code raises goes on.
+    """
     if not path.is_file():
         raise AgentSpecError(f"agent '{spec}': there is no file {path.absolute()}.")
     path = path.resolve()
@@ -151,4 +198,4 @@ def _hint(name: str, known: list[str]) -> str:
     return f"{start}known: {', '.join(known) or 'none'}."
 
 
-__all__ = ["AGENTS", "AgentEntry", "AgentSpecError", "load_agent"]
+__all__ = ["AGENTS", "SCHEMES", "AgentEntry", "AgentSpecError", "load_agent", "module_of_file"]

@@ -35,6 +35,7 @@ class Requirements:
     control_dt_s: float = 0.1
     privileged: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)  # further environment options
+    hd_map: bool = False  # True: the static `Town` is in the observation under the key `town`
     branchable: bool = True  # False for an agent that hides memory outside its `Memory`
 
     def __post_init__(self) -> None:
@@ -46,7 +47,9 @@ class Requirements:
         """The track that these needs put an agent in."""
         if self.privileged:
             return Track.PRIVILEGED
-        if {"camera", "lidar"} & set(self.observations):
+        if self.hd_map:
+            return Track.MAP
+        if {"camera", "lidar"} & set(self.observations) or "prompt" not in self.observations:
             return Track.SENSORS
         return Track.PROMPT
 

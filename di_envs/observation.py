@@ -89,7 +89,8 @@ def observation_space(
     `prompt.COMPONENTS`).
 
     Group `inertial`: `imu` (ax, ay, az [m/s2], gx, gy, gz [rad/s], compass [rad]) and `gnss`
-    (latitude, longitude [deg], altitude [m]; double precision, as a single one is 0.4 m coarse).
+    (latitude, longitude [deg], altitude [m]; double precision, as a single one is 0.4 m coarse),
+    and the speedometer, which is the prompt's `speed`.
 
     Group `camera`: for each camera of the rig `cameras` its RGB image (H, W, 3) under its name, and
     what else the rig asks for (see `Rig`).
@@ -108,6 +109,7 @@ def observation_space(
         space["gnss"] = spaces.Box(
             np.array([-90.0, -180.0, -1e4]), np.array([90.0, 180.0, 1e4]), dtype=np.float64
         )
+        space["speed"] = _table("speed")
     if "camera" in groups:
         space.update(_image_spaces(rig_of(cameras)))
     if "lidar" in groups:
@@ -254,6 +256,10 @@ class Observer:
         if self._with_inertial:
             observation["imu"] = sight.imu.copy()
             observation["gnss"] = sight.gnss.copy()
+            if not self._with_prompt:
+                speed_mps = float(sight.state.speed[self._ego])
+                speed_mps = min(max(speed_mps, -SPEED_LIMIT_MPS), SPEED_LIMIT_MPS)
+                observation["speed"] = np.array([speed_mps], np.float32)
         if self._cameras is not None:
             observation.update(self._cameras.observe())
         if self._lidar is not None:

@@ -14,12 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from agents.base import Agent
+from agents.base import Agent, Requirements
+from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, WorldView
 from leaderboard.episode_log import EpisodeLog, lost_record, route_record
 from leaderboard.jobs import Job
-from leaderboard.record import AGENT_CRASHED, NOT_SET_UP, SIMULATION_CRASHED, RouteRecord
+from leaderboard.record import (
+    AGENT_CRASHED,
+    NOT_SET_UP,
+    SENSORS_INVALID,
+    SIMULATION_CRASHED,
+    RouteRecord,
+)
 from leaderboard.rules import Rules
 
 _LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
@@ -94,11 +101,11 @@ def _drive(
     view: WorldView = env.unwrapped.view
     agent, memory = _start(new_agent, view.plans[view.ego], job)
     try:
-        privileged = agent.requires.privileged
+        extras = extra_keys(agent.requires, view)
         log.hashes.add_observation(observation)
         over = False
         while not over:
-            seen = {**observation, "world": view} if privileged else observation
+            seen = {**observation, **extras} if extras else observation
             control, memory = _act(agent, seen, memory)
             observation, reward, over, events = _step(env, control)
             log.add_step(control, reward, events)
@@ -107,12 +114,22 @@ def _drive(
         close_agent(agent)
 
 
+def extra_keys(requires: Requirements, view: WorldView) -> dict[str, Any]:
+    """What an agent is handed beside its environment's observation."""
+    extras: dict[str, Any] = {"world": view} if requires.privileged else {}
+    if requires.hd_map:
+        extras["town"] = view.town
+    return extras
+
+
 def _start(
     new_agent: Callable[[], Agent[Any]], plan: RoutePlan, job: Job
 ) -> tuple[Agent[Any], Any]:
     try:
         agent = new_agent()
         return agent, agent.start(plan, job.world_seed)
+    except SensorSuiteError as error:
+        raise FaultError(SENSORS_INVALID, str(error)) from error
     except (Exception, SystemExit) as error:
         raise FaultError(NOT_SET_UP, describe(error)) from error
 
@@ -122,6 +139,8 @@ def _act(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tupl
     try:
         control, memory = agent.act(observation, memory)
         control = np.asarray(control, dtype=np.float32)
+    except SensorSuiteError as error:
+        raise FaultError(SENSORS_INVALID, str(error)) from error
     except (Exception, SystemExit) as error:
         raise FaultError(AGENT_CRASHED, describe(error)) from error
     wrong = control_error(control)

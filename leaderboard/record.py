@@ -20,6 +20,7 @@ from leaderboard.score import Score
 
 # CARLA's statuses of routes that code ended, not driving
 NOT_SET_UP = "Failed - Agent couldn't be set up"
+SENSORS_INVALID = "Failed - Agent's sensors were invalid"
 AGENT_CRASHED = "Failed - Agent crashed"
 SIMULATION_CRASHED = "Failed - Simulation crashed"
 # Ours, for routes whose worker process died, and those that took too long by the clock on the wall

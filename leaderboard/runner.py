@@ -108,7 +108,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
             "observations": list(requires.observations),
             "control_dt_s": requires.control_dt_s,
             "privileged": requires.privileged,
-            "options": dict(requires.options),
+            "options": _as_json(requires.options),
         },
         suite=suite.name,
         suite_version=suite.version,
@@ -125,6 +125,10 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
 def _as_json(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [_as_json(item) for item in value]
+    if isinstance(value, Mapping):
+        return {name: _as_json(item) for name, item in value.items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return _as_json(dataclasses.asdict(value))  # a rig or a LiDAR of one's own
     return str(value) if isinstance(value, Path) else value
 
 

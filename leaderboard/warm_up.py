@@ -23,7 +23,7 @@ from agents.base import Requirements
 from di_envs.kernels import kernel_sources
 from leaderboard.bound import light_limited_bound
 from leaderboard.driver import Driver, agent_requirements
-from leaderboard.episode import describe
+from leaderboard.episode import describe, extra_keys
 from leaderboard.jobs import Job, RunSpec
 
 WARM_UP_STEPS = 3
@@ -87,8 +87,7 @@ def _drive_a_little(driver: Driver, job: Job) -> None:
     with suppress(Exception, SystemExit):
         agent = driver.new_agent()
         memory = agent.start(view.plans[view.ego], job.world_seed)
-        seen = {**observation, "world": view} if driver.requires.privileged else observation
-        agent.act(seen, memory)
+        agent.act({**observation, **extra_keys(agent.requires, view)}, memory)
         agent.close()
     for _ in range(WARM_UP_STEPS):
         driver.env.step(np.array([0.0, 0.0, 1.0], dtype=np.float32))

@@ -11,7 +11,7 @@ from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
 
 PROMPT = {*COMPONENTS, "prompt_present"}
-INERTIAL = {"imu", "gnss"}
+INERTIAL = {"imu", "gnss", "speed"}
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +68,10 @@ def test_every_component_is_given_in_the_order_of_the_flags(scene):
 def test_the_gnss_is_double_precision_as_half_a_metre_is_lost_in_single(scene):
     assert scene.observe(("inertial",))["gnss"].dtype == np.float64
     assert float(np.spacing(np.float32(49.0))) * 111_000 > 0.4  # metres a step of float32 at 49°
+
+
+def test_the_speedometer_shows_what_the_prompt_does(scene):
+    scene.put(0, *scene.plan.points[0], speed=7.25)
+    alone, beside = scene.observe(("inertial",)), scene.observe(("prompt", "inertial"))
+    assert alone["speed"] == beside["speed"] == np.float32([7.25])
+    assert alone["speed"].dtype == np.float32

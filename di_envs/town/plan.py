@@ -54,6 +54,10 @@ class RoutePlan:
     route_m: NDArray[np.float64]  # (R,) distance along the route (sum of straight steps), from 0
     targets: NDArray[np.int32]  # (T,) indices of the target points (50 m rule), ascending
     scenarios: tuple[ScenarioTrigger, ...] = ()  # by ascending point, one a point
+    geo_origin: tuple[float, float] = (
+        0.0,
+        0.0,
+    )  # of the town: latitude, longitude [deg] of x = y = 0
 
     @property
     def length_m(self) -> float:

@@ -340,6 +340,7 @@ def _plan_of(
         lane_m=_read_only(trace.lane_m),
         route_m=_read_only(np.concatenate([[0.0], np.cumsum(step_m)])),
         targets=_read_only(target_indices(points, option)),
+        geo_origin=town.geo_origin,
     )
 
 

@@ -93,6 +93,8 @@ def test_importing_the_table_imports_no_driver():
     [
         (Requirements(), Track.PROMPT),
         (Requirements(observations=("camera", "prompt")), Track.SENSORS),
+        (Requirements(observations=("inertial",)), Track.SENSORS),
+        (Requirements(observations=("camera",), hd_map=True), Track.MAP),
         (Requirements(observations=("camera",), privileged=True), Track.PRIVILEGED),
     ],
 )

@@ -1,0 +1,1 @@
+"""What agents for CARLA import from its `agents.navigation`: the names of road options."""

@@ -1,0 +1,1 @@
+"""What agents for the CARLA Leaderboard derive from, where they import it from."""

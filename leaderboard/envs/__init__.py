@@ -1,0 +1,1 @@
+"""What agents for the CARLA Leaderboard import from its `leaderboard.envs`."""
