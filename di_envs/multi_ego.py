@@ -218,7 +218,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
     def _draw(self, agent: str, observations: Mapping[str, Observation]) -> Any:
         assert self._screen is not None
         ego = self.possible_agents.index(agent)
-        seen = observations.get(agent) or self._observers[ego].observe()
+        seen = observations.get(agent) or self._observers[ego].front()
         return self._screen.draw(self.view, ego, seen)
 
     def _start(self) -> None:

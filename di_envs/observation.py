@@ -242,6 +242,10 @@ class Observer:
             )
             self._lidar.start(view)
 
+    def front(self) -> dict[str, Any]:
+        """What a view for people shows of the observation: the front camera, if there is one."""
+        return {} if self._cameras is None else self._cameras.observe(only="camera_front")
+
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
         sight = self._sight

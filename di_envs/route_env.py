@@ -173,7 +173,14 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             raise gymnasium.error.ResetNeeded("There is nothing to see yet. Call reset() first.")
         if self.render_mode is None:
             gymnasium.logger.warn("render() does nothing: make it with render_mode='rgb_array'.")
-        return self._draw(self._observer.observe()) if self.render_mode == "rgb_array" else None
+        return self._draw(self._observer.front()) if self.render_mode == "rgb_array" else None
+
+    def picture(self, observation: Observation) -> Any:
+        """What `render` returns, with the camera's image taken from the present observation.
+
+        Whoever has just been given one, as when filming, so spares a second look.
+        """
+        return self._draw(observation)
 
     def close(self) -> None:
         """Closes the window, if there is one."""

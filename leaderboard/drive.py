@@ -16,6 +16,7 @@ from agents import load_agent
 from agents.base import Requirements
 from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
+from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
 from leaderboard.driver import environment_options
@@ -26,7 +27,7 @@ from leaderboard.rules import rules_named
 from leaderboard.video import open_video
 from leaderboard.warm_up import SetupError, compile_progress, warm_up
 
-Watch = Callable[[Mapping[str, Any]], None]
+Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
 
 
 def drive(
@@ -61,18 +62,18 @@ def drive(
         job = Job(index=0, route_id=route_id or scene.route_ids[0], seed=seed)
         if film is not None:
             with compile_progress(console):  # cameras that the agent itself does not need
-                env.reset(seed=job.world_seed, options={"route": job.route_id})
-                env.render()
+                first, _ = env.reset(seed=job.world_seed, options={"route": job.route_id})
+                env.picture(first)
         shown = closing.enter_context(_progress(console))
         task = shown.add_task("", total=100.0)
 
-        def watch(info: Mapping[str, Any]) -> None:
+        def watch(info: Mapping[str, Any], observation: dict[str, Any]) -> None:
             for event in info["events"]:
                 shown.print(event_line(event))
             standing = f"{info['game_time_s']:.1f} s, DS {info['driving_score']:.1f}"
             shown.update(task, completed=info["route_completion"], description=standing)
             if film is not None:
-                film.add(env.render())
+                film.add(env.picture(observation))
 
         groups = _groups(spec, scene.requires)
         keys = observation_space(groups, env.config.cameras, env.config.lidar).keys()
@@ -81,7 +82,7 @@ def drive(
 
 
 class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Shows every step's `info` to a spectator, and the agent no more than its observation."""
+    """Shows every step's result to a spectator, and the agent no more than its observation."""
 
     def __init__(self, env: RouteEnv, watch: Watch, keys: Iterable[str]) -> None:
         super().__init__(env)
@@ -90,13 +91,13 @@ class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Resets the environment."""
         observation, info = self.env.reset(**arguments)
-        self._watch(info)
+        self._watch(info, observation)
         return self._own(observation), info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Steps the environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._watch(info)
+        self._watch(info, observation)
         return self._own(observation), reward, terminated, truncated, info
 
     def _own(self, observation: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,6 +141,9 @@ def _environment(spec: RunSpec, requires: Requirements, *, filmed: bool, camera:
     groups = _groups(spec, requires)
     if filmed and camera and "camera" not in groups:
         options["observations"] = (*groups, "camera")
+        cameras = rig_of(options.get("cameras", "small")).cameras
+        front = [camera for camera in cameras if camera.name == "camera_front"]
+        options["cameras"] = Rig(cameras=tuple(front or cameras[:1]))
     try:
         return RouteEnv(render_mode="rgb_array" if filmed else None, **options)
     except (ValueError, OSError) as error:

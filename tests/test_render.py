@@ -128,6 +128,20 @@ def test_the_panel_shows_a_camera_where_there_is_one(started):
     assert np.array_equal(shown[180:400, MAP_PX:], without[0:220, MAP_PX:])
 
 
+def test_a_picture_of_an_observation_is_the_one_that_render_gives():
+    """With and without a second look through the front camera, and with no other sensor."""
+    seeing = RouteEnv(suite="toy", traffic=2, walkers=2, render_mode="rgb_array")
+    blind = RouteEnv(
+        suite="toy", traffic=2, walkers=2, observations=GROUPS, render_mode="rgb_array"
+    )
+    observation, _ = seeing.reset(seed=2)
+    blind.reset(seed=2)
+    rendered = seeing.render()
+    assert np.array_equal(seeing.picture(observation), rendered)
+    assert not np.array_equal(seeing.picture({}), rendered)
+    assert np.array_equal(seeing.picture({}), blind.render())
+
+
 def test_tiles_meet_without_a_seam(env):
     from PIL import Image
 

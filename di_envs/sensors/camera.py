@@ -62,11 +62,17 @@ class CameraRig:
         )
         self._render = bind(render, self._studio, canvas, self._ego, 0)
 
-    def observe(self) -> dict[str, NDArray[Any]]:
-        """The present images; every array is a fresh one."""
+    def observe(self, only: str | None = None) -> dict[str, NDArray[Any]]:
+        """The present images; every array is a fresh one.
+
+        Args:
+            only: Name of the one camera that is wanted; None for all.
+        """
         self._collect(self._scene, self._studio.state, self._ego, RANGE_M, self._boxes)
         images: dict[str, NDArray[Any]] = {}
         for number, camera in enumerate(self.rig.cameras):
+            if only is not None and camera.name != only:
+                continue
             canvas = self._fresh(self._canvases[number])
             self._render(self._studio, canvas, self._ego, self._keys[number])
             images[camera.name] = canvas.rgb.reshape(camera.height, camera.width, 3)

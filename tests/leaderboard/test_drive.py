@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
+from di_envs.sensors.camera import CameraRig
 from di_envs.suites import load_suite
 from di_envs.world.state import EventKind
 from di_envs.world.world import Event
@@ -52,6 +53,23 @@ def test_it_is_the_drive_that_evaluate_scores_whether_it_is_filmed_or_not(scored
             durations.append(gif.info["duration"])
     assert sum(durations) == 100 * (filmed.steps + 1)
     assert len(durations) > 0.5 * filmed.steps
+
+
+def test_the_agent_and_the_film_share_one_look_of_one_camera(silent, tmp_path, monkeypatch):
+    """The expert needs no camera: the front one is there for the film, and looks once a step."""
+    looks = []
+    observe = CameraRig.observe
+
+    def counted(rig, only=None):
+        images = observe(rig, only)
+        looks.append(list(images))
+        return images
+
+    monkeypatch.setattr(CameraRig, "observe", counted)
+    film = tmp_path / "one.gif"
+    record = drive(SPEC, route_id=ROUTE, seed=2, console=silent, video=film)
+    resets = 2  # one to compile what the film needs, before the clock runs
+    assert looks == [["camera_front"]] * (record.steps + resets)
 
 
 def test_a_film_has_a_frame_for_the_reset_and_one_for_every_step(tmp_path, capsys):
