@@ -25,8 +25,7 @@ HEADER = (
 def row(run: RunRecord) -> str:
     """One run: means over routes and seeds, with the 95 % t-interval of the means by seed."""
     driven_km = math.fsum(record.done_m for record in run.routes) / 1000.0
-    rules = rules_named(run.rules)
-    scored = rules.factors.keys() | rules.proportional
+    scored = rules_named(run.rules).scored
     count = sum(event.kind in scored for record in run.routes for event in record.events)
     completion = mean_interval(seed_means(run.routes, "route_completion", run.seeds))
     penalty = mean_interval(seed_means(run.routes, "infraction_score", run.seeds))

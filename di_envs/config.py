@@ -14,7 +14,7 @@ from di_envs.world.kinds import TICK_S, EventKind
 
 OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar")
 EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
-RULES = ("carla-1.0",)
+RULES = ("carla-1.0", "carla-2.0", "carla-2.1")
 
 # Names of CARLA's presets (carla.WeatherParameters), the fourteen of the Leaderboard first.
 WEATHERS = (

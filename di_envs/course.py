@@ -15,8 +15,8 @@ from gymnasium import spaces
 
 from di_envs.config import RouteEnvConfig, check_name
 from di_envs.observation import Observer, observation_space
+from di_envs.penalties import PENALTIES, Penalties
 from di_envs.reward import (
-    PENALTIES,
     Standing,
     infraction_penalty,
     reward_terms,
@@ -39,7 +39,7 @@ class Course:
         town: The town.
         plans: The routes that there are to drive.
         world_config: How many others there are.
-        penalties: Factor of each kind of infraction.
+        penalties: What infractions cost.
         stops: Events that end an episode besides those by which the rules do.
     """
 
@@ -47,7 +47,7 @@ class Course:
     town: Town
     plans: tuple[RoutePlan, ...]
     world_config: WorldConfig
-    penalties: Mapping[EventKind, float]
+    penalties: Penalties
     stops: tuple[EventKind, ...]
 
     @property

@@ -1,34 +1,18 @@
 """The reward: how much the driving score, in metres, grew in a step, as named terms.
 
-Score in metres = route metres done x (1 - share of them outside the lanes) x penalty of each
-infraction so far. A step's reward is its growth, so an episode's return is its driving score in
-metres, `route length x driving score / 100`: what the Leaderboard counts is what is learned. The
-terms add up to the reward as follows: progress first, then metres outside, both at the penalty
-before the step, then each infraction.
+Score in metres = route metres done x (1 - share of them outside the lanes) x infraction score so
+far. A step's reward is its growth, so an episode's return is its driving score in metres,
+`route length x driving score / 100`: what the Leaderboard counts is what is learned. The terms add
+up to the reward as follows: progress first, then metres outside, both at the infraction score
+before the step, then each kind of infraction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
+from di_envs.penalties import Penalties
 from di_envs.world.state import EventKind, State
-
-# Source: CARLA Leaderboard 1.0, statistics manager. Each event multiplies the penalty.
-PENALTIES: Mapping[str, Mapping[EventKind, float]] = MappingProxyType(
-    {
-        "carla-1.0": MappingProxyType(
-            {
-                EventKind.COLLISION_WALKER: 0.50,
-                EventKind.COLLISION_VEHICLE: 0.60,
-                EventKind.COLLISION_STATIC: 0.65,
-                EventKind.RED_LIGHT: 0.70,
-                EventKind.STOP_SIGN: 0.80,
-            }
-        )
-    }
-)
 
 
 class Standing(NamedTuple):
@@ -37,6 +21,7 @@ class Standing(NamedTuple):
     done_m: float  # metres of the dense route completed
     outside_share: float  # of the route metres so far, outside the lanes or against them, 0..1
     counts: tuple[int, ...]  # events so far, by EventKind
+    pace_shares: tuple[float, ...] = ()  # at checkpoints, of the traffic's mean speed, 0..1
 
 
 def standing_of(state: State, ego: int) -> Standing:
@@ -45,7 +30,8 @@ def standing_of(state: State, ego: int) -> Standing:
     # Counted over route points of its own, as CARLA does: nearly, not exactly, the metres done.
     share = min(outside_m / float(state.outside_done_m[ego]), 1.0) if outside_m > 0.0 else 0.0
     counts = tuple(state.counts[ego].tolist())
-    return Standing(float(state.route_done_m[ego]), share, counts)
+    pace_shares = tuple(state.pace_share[ego].tolist()) if counts[EventKind.MIN_SPEED] else ()
+    return Standing(float(state.route_done_m[ego]), share, counts, pace_shares)
 
 
 def inside_metres(standing: Standing) -> float:
@@ -53,32 +39,27 @@ def inside_metres(standing: Standing) -> float:
     return standing.done_m * (1.0 - standing.outside_share)
 
 
-def infraction_penalty(standing: Standing, penalties: Mapping[EventKind, float]) -> float:
-    """The product over all infractions so far, 1 for none; metres outside are not in it."""
-    penalty = 1.0
-    for kind, factor in penalties.items():
-        penalty *= factor ** standing.counts[kind]
-    return penalty
+def infraction_penalty(standing: Standing, penalties: Penalties) -> float:
+    """The infraction score so far, 1 for none; metres outside are not in it."""
+    return penalties.infraction_score(standing.counts, standing.pace_shares)
 
 
-def score_metres(standing: Standing, penalties: Mapping[EventKind, float]) -> float:
+def score_metres(standing: Standing, penalties: Penalties) -> float:
     """The driving score in metres of the route: what a step's reward is the growth of."""
     return inside_metres(standing) * infraction_penalty(standing, penalties)
 
 
-def reward_terms(
-    before: Standing, after: Standing, penalties: Mapping[EventKind, float]
-) -> dict[str, float]:
+def reward_terms(before: Standing, after: Standing, penalties: Penalties) -> dict[str, float]:
     """The reward of a step, taken apart; its terms add up to the growth of `score_metres`.
 
     Args:
         before: Standing at the step's start.
         after: Standing at its end.
-        penalties: Factor of each kind of infraction.
+        penalties: What infractions cost.
 
     Returns:
-        `progress` and `outside_lanes` [m, times the penalty before], then one term a kind of
-        infraction, named as the event: what the infraction takes of the score, 0 or negative.
+        `progress` and `outside_lanes` [m, times the infraction score before], then one term a kind
+        of infraction, named as the event: what the infraction takes of the score, 0 or negative.
     """
     penalty = infraction_penalty(before, penalties)
     progress_m = after.done_m - before.done_m
@@ -88,8 +69,21 @@ def reward_terms(
         "outside_lanes": (inside_m - inside_metres(before) - progress_m) * penalty,
     }
     score = inside_m * penalty
-    for kind, factor in penalties.items():
-        left = score * factor ** (after.counts[kind] - before.counts[kind])
+    seen = before
+    for kind in penalties.scored:
+        left = score
+        if after.counts[kind] != before.counts[kind]:
+            seen = _with_kind(seen, after, kind)
+            left = inside_m * infraction_penalty(seen, penalties)
         terms[kind.name.lower()] = left - score
         score = left
     return terms
+
+
+def _with_kind(standing: Standing, after: Standing, kind: EventKind) -> Standing:
+    """The standing, with infractions of one kind as they are afterwards."""
+    if kind == EventKind.MIN_SPEED:
+        return standing._replace(pace_shares=after.pace_shares)
+    counts = list(standing.counts)
+    counts[kind] = after.counts[kind]
+    return standing._replace(counts=tuple(counts))

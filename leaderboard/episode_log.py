@@ -7,6 +7,7 @@ finds, field by field.
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -136,12 +137,11 @@ def route_record(
     """
     state, plan, ego = view.state, view.plans[view.ego], view.ego
     events = (*log.events, *_outside_lanes_so_far(view, log))
-    finished = int(state.finished[ego])
     status, reason = fault
     progress = Progress(
         done_m=float(state.route_done_m[ego]),
         length_m=plan.length_m,
-        completed=finished == EventKind.COMPLETED and not reason,
+        completed=state.finished[ego] == EventKind.COMPLETED and not reason,
         travelled_m=float(state.outside_done_m[ego]),
     )
     observation_hash, reward_hash, event_hash = log.hashes.hex()
@@ -150,7 +150,7 @@ def route_record(
         seed=job.seed,
         index=job.index,
         world_seed=job.world_seed,
-        status=status or _ending(finished, rules),
+        status=status or rules.status(event.kind for event in events),
         reason=reason,
         score=score_route(events, progress, rules),
         length_m=plan.length_m,
@@ -163,6 +163,7 @@ def route_record(
         bound=light_limited_bound(view.town, plan, job.world_seed),
         events=events,
         interventions=interventions,
+        scenarios=_scenarios(events),
         route_hash=route_hash(plan),
         observation_hash=observation_hash,
         reward_hash=reward_hash,
@@ -171,6 +172,12 @@ def route_record(
         observation_checks=pack(log.hashes.checks(), CHECK_TYPE),
         trace=log.trace(),
     )
+
+
+def _scenarios(events: Iterable[EventRecord]) -> Mapping[str, int]:
+    """How many scenarios began of each type, by the Leaderboard's number."""
+    types = sorted(int(event.value) for event in events if event.kind == EventKind.SCENARIO)
+    return {str(number): count for number, count in Counter(types).items()}
 
 
 def lost_record(job: Job, reason: str) -> RouteRecord:
@@ -198,11 +205,6 @@ def lost_record(job: Job, reason: str) -> RouteRecord:
     )
 
 
-def _ending(finished: int, rules: Rules) -> str:
-    """CARLA's status; plain Failed when `terminate_on` ended the route by an infraction."""
-    return rules.endings.get(EventKind(finished), "Failed") if finished else "Failed"
-
-
 def _outside_lanes_so_far(view: WorldView, log: EpisodeLog) -> tuple[EventRecord, ...]:
     """The metres outside lanes where a fault kept the world from saying them at the end."""
     state, ego = view.state, view.ego
@@ -222,10 +224,12 @@ def _outside_lanes_so_far(view: WorldView, log: EpisodeLog) -> tuple[EventRecord
 
 
 def route_hash(plan: RoutePlan) -> str:
-    """A hash of the route's town, points, options and targets."""
+    """A hash of the route's town, points, options, targets and scenarios."""
     digest = hashlib.blake2b(plan.town.encode(), digest_size=16)
     for array in (plan.points, plan.option, plan.targets):
         digest.update(array.tobytes())
+    for trigger in plan.scenarios:
+        digest.update(f"{trigger.point} {trigger.type} {trigger.subtype}\0".encode())
     return digest.hexdigest()
 
 

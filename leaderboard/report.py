@@ -14,7 +14,7 @@ from rich.text import Text
 from di_envs.world.state import EventKind
 from leaderboard.confidence import Interval, mean_interval
 from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.rules import rules_named
+from leaderboard.rules import Rules, rules_named
 from leaderboard.score import count_infractions, infractions_per_km
 
 SHORT_NAMES = {
@@ -27,6 +27,7 @@ SHORT_NAMES = {
     EventKind.ROUTE_DEVIATION: "off route",
     EventKind.TIMEOUT: "timeout",
     EventKind.BLOCKED: "blocked",
+    EventKind.MIN_SPEED: "too slow",
 }
 
 
@@ -68,7 +69,7 @@ def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
     """DS, RC, IS, bound, infractions per km and a summary, over the seeds of one route."""
     driven = [record for record in records if not record.lost]
     if not driven:
-        return ["-"] * 5 + [escape(_summary(records))]
+        return ["-"] * 5 + [escape(_summary(records, rules_named(run.rules)))]
     scores = [record.score for record in driven]
     return [
         f"{_mean([score.driving_score for score in scores]):.1f}",
@@ -76,7 +77,7 @@ def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
         f"{_mean([score.infraction_score for score in scores]):.2f}",
         _bound_cell(driven),
         f"{_scored_per_km(driven, run):.2f}",
-        escape(_summary(records)),
+        escape(_summary(records, rules_named(run.rules))),
     ]
 
 
@@ -119,15 +120,14 @@ def _mean(values: Sequence[float]) -> float:
 def _scored_per_km(records: Sequence[RouteRecord], run: RunRecord) -> float:
     """Infractions that lower IS, per kilometre driven, over all these records together."""
     rules = rules_named(run.rules)
-    scored = rules.factors.keys() | rules.proportional
-    count = sum(event.kind in scored for record in records for event in record.events)
+    count = sum(event.kind in rules.scored for record in records for event in record.events)
     return infractions_per_km(count, math.fsum(record.done_m for record in records))
 
 
-def _summary(records: Sequence[RouteRecord]) -> str:
+def _summary(records: Sequence[RouteRecord], rules: Rules) -> str:
     """What went wrong, counted: `2 red light, 1 timeout, 1 agent crashed`."""
     driven = [record for record in records if not record.lost]
-    kinds = count_infractions(event.kind for record in driven for event in record.events)
+    kinds = count_infractions((event.kind for r in driven for event in r.events), rules)
     parts = [f"{count} {SHORT_NAMES[kind]}" for kind, count in kinds.items() if count]
     crashes = Counter(record.status for record in driven if record.crashed)
     parts += [f"{count} {_plain_status(status)}" for status, count in crashes.items()]
@@ -147,7 +147,8 @@ def _infraction_table(run: RunRecord) -> Table:
     table.add_column("count", justify="right")
     table.add_column("per km", justify="right")
     driven_m = math.fsum(record.done_m for record in run.scored)
-    kinds = count_infractions(event.kind for record in run.scored for event in record.events)
+    happened = (event.kind for record in run.scored for event in record.events)
+    kinds = count_infractions(happened, rules_named(run.rules))
     for kind, count in kinds.items():
         table.add_row(SHORT_NAMES[kind], str(count), f"{infractions_per_km(count, driven_m):.3f}")
     return table

@@ -2,7 +2,7 @@
 
 Driving score DS = route completion RC (0..100) x infraction score IS (0..1), a product a route; a
 benchmark's DS is the mean of these products, never the product of means.
-Source: CARLA Leaderboard 1.0 (facts about its statistics manager; written anew).
+Source: CARLA Leaderboard 1.0 and 2.x (facts about their statistics managers; written anew).
 """
 
 from __future__ import annotations
@@ -15,19 +15,6 @@ from typing import Protocol
 
 from di_envs.world.state import EventKind
 from leaderboard.rules import Rules
-
-# CARLA's nine infractions in its own order
-INFRACTIONS = (
-    EventKind.COLLISION_WALKER,
-    EventKind.COLLISION_VEHICLE,
-    EventKind.COLLISION_STATIC,
-    EventKind.RED_LIGHT,
-    EventKind.STOP_SIGN,
-    EventKind.OUTSIDE_LANES,
-    EventKind.ROUTE_DEVIATION,
-    EventKind.TIMEOUT,
-    EventKind.BLOCKED,
-)
 
 
 class Counted(Protocol):
@@ -57,14 +44,18 @@ class Progress:
     completed: bool = False
     travelled_m: float | None = None
 
-    @property
-    def route_completion(self) -> float:
-        """RC in percent, 0..100; 100 for a completed route."""
+    def route_completion(self, decimals: int | None = None) -> float:
+        """RC in percent, 0..100; 100 for a completed route.
+
+        Args:
+            decimals: To which it is rounded; None for not.
+        """
         if self.completed:
             return 100.0
         if self.length_m <= 0.0:
             return 0.0
-        return 100.0 * min(max(self.done_m / self.length_m, 0.0), 1.0)
+        percent = 100.0 * min(max(self.done_m / self.length_m, 0.0), 1.0)
+        return percent if decimals is None else round(percent, decimals)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,18 +71,26 @@ class Score:
 
 
 def score_route(events: Iterable[Counted], progress: Progress, rules: Rules) -> Score:
-    """Scores one route.
+    """Scores one route; the order of the events does not change a bit of it.
 
-    Multiplies in the order of the events, so that equal events give equal bits.
+    Raises:
+        ValueError: If there is an event of which the rules say nothing.
     """
-    penalty = 1.0
+    happened = tuple(events)
+    for event in happened:
+        rules.check(event.kind)
     travelled_m = progress.done_m if progress.travelled_m is None else progress.travelled_m
-    for event in events:
-        if event.kind in rules.factors:
-            penalty *= rules.factors[event.kind]
-        elif event.kind in rules.proportional:
-            penalty *= 1.0 - share_of_distance(event.value, travelled_m)
-    return Score(route_completion=progress.route_completion, infraction_score=penalty)
+    counts = Counter(event.kind for event in happened)
+    paces = [e.value / 100.0 for e in happened if e.kind == EventKind.MIN_SPEED]
+    outside = [
+        share_of_distance(e.value, travelled_m)
+        for e in happened
+        if e.kind == EventKind.OUTSIDE_LANES
+    ]
+    return Score(
+        route_completion=progress.route_completion(rules.completion_decimals),
+        infraction_score=rules.penalties.infraction_score(counts, paces, outside),
+    )
 
 
 def share_of_distance(wrong_m: float, travelled_m: float) -> float:
@@ -117,10 +116,10 @@ def mean_score(scores: Sequence[Score]) -> tuple[float, float, float]:
     )
 
 
-def count_infractions(kinds: Iterable[EventKind]) -> Mapping[EventKind, int]:
-    """How often each of CARLA's nine infractions happened, in CARLA's order, zeros included."""
+def count_infractions(kinds: Iterable[EventKind], rules: Rules) -> Mapping[EventKind, int]:
+    """How often each infraction of the rules happened, in CARLA's order, zeros included."""
     counts = Counter(kinds)
-    return {kind: counts[kind] for kind in INFRACTIONS}
+    return {kind: counts[kind] for kind in rules.infractions}
 
 
 def infractions_per_km(count: int, done_m: float) -> float:

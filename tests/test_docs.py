@@ -17,9 +17,10 @@ import di_envs
 from agents import AGENTS
 from agents.base import Requirements
 from di_envs.observation import observation_space
-from di_envs.reward import PENALTIES, Standing, reward_terms
+from di_envs.penalties import PENALTIES
+from di_envs.reward import Standing, reward_terms
 from di_envs.suites import suite_names
-from di_envs.world.state import EventKind
+from di_envs.world.state import EVENT_KINDS, EventKind
 from leaderboard.cli import Command, Evaluate
 
 TOP = Path(__file__).resolve().parent.parent
@@ -127,7 +128,7 @@ def test_the_table_of_observations_is_the_space():
 def test_the_tables_of_events_and_rewards_are_the_rules():
     told = rows(CONVENTIONS, 3)
     assert {kind.name.lower() for kind in EventKind} <= told.keys()
-    for kind, factor in PENALTIES["carla-1.0"].items():
+    for kind, factor in PENALTIES["carla-1.0"].costs.items():
         assert told[kind.name.lower()][-1] == f"score x {factor:.2f}"
-    still = Standing(0.0, 0.0, (0,) * 12)
+    still = Standing(0.0, 0.0, (0,) * EVENT_KINDS)
     assert reward_terms(still, still, PENALTIES["carla-1.0"]).keys() <= rows(CONVENTIONS, 2).keys()

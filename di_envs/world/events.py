@@ -2,8 +2,8 @@
 """All events of CARLA Leaderboard 1.0 for one ego and tick, each by the rule of its own module.
 
 Source: CARLA leaderboard and scenario_runner, branches `leaderboard-1.0`, of which the geometry,
-thresholds and de-duplication are kept, traps included. Collisions are recorded where they happen,
-in `contact.resolve_contacts`.
+thresholds and de-duplication are kept, traps included; the minimum speed is 2.x's. Collisions are
+recorded where they happen, in `contact.resolve_contacts`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from di_envs.town.queries import pose_at
 from di_envs.world.bodies import EgoNow
 from di_envs.world.event_rows import count_rows, record
 from di_envs.world.lane_keeping import watch_lanes
+from di_envs.world.min_speed import begin_pace, close_pace, watch_pace
 from di_envs.world.red_light import detect_red_light
 from di_envs.world.route_end import find_route_end
 from di_envs.world.state import EventKind
@@ -47,10 +48,11 @@ def begin_events(state, ego):
     state.blocked_ticks[ego] = 0
     state.finished[ego] = 0
     state.counts[ego, :] = 0
+    begin_pace(state, ego)
 
 
 @kernel
-def detect_events(state, lanes, signals, routes, ego, out, n):
+def detect_events(state, lanes, signals, routes, ego, vehicle_end, out, n):
     """Looks for every event but collisions, after `locate_ego` and `advance_progress`.
 
     Args:
@@ -59,6 +61,7 @@ def detect_events(state, lanes, signals, routes, ego, out, n):
         signals: The town's signals.
         routes: The egos' routes.
         ego: The ego's actor index.
+        vehicle_end: First actor id behind the vehicles.
         out: (N, 8) event rows: kind, ego, tick, x, y, z, other, value.
         n: Rows in use.
 
@@ -85,8 +88,10 @@ def detect_events(state, lanes, signals, routes, ego, out, n):
     watch_lanes(state, lanes, routes, now, lane_yaw)
     n = detect_red_light(state, lanes, signals, now, out, n)
     n = detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n)
+    n = watch_pace(state, routes, now, vehicle_end, out, n)
     reason = find_route_end(state, routes, now)
     if reason != 0:
+        n = close_pace(state, routes, now, out, n)
         n = _end_route(now, reason, state.outside_m[ego], out, n)
         state.finished[ego] = reason
     count_rows(state.counts, out, before, n)

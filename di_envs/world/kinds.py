@@ -24,7 +24,7 @@ class ActorKind(IntEnum):
 
 
 class EventKind(IntEnum):
-    """What Leaderboard 1.0 counts, what ends a route, and what was put in an ego's way."""
+    """What Leaderboards 1.0 and 2.x count, what ends a route, and what was put in an ego's way."""
 
     COLLISION_WALKER = 1
     COLLISION_VEHICLE = 2
@@ -37,3 +37,4 @@ class EventKind(IntEnum):
     TIMEOUT = 9
     COMPLETED = 10
     SCENARIO = 11  # one began; value: its type, other: its number among the plan's scenarios
+    MIN_SPEED = 12  # value: the ego's mean speed in percent of the traffic's; counts in 2.x only

@@ -25,6 +25,7 @@ HISTORY_LENGTH = SPEED_HISTORY * HISTORY_TICKS + 1
 OCCUPIED_LANES = 4  # lanes that a free body (an ego, a walker) may lie on at once
 COLLISION_MEMORY = 8  # remembered collision places
 EVENT_KINDS = max(EventKind) + 1  # columns of `counts`
+CHECKPOINTS = 4  # along a route, at which the ego's mean speed is compared with the traffic's
 
 
 @by_reference
@@ -111,6 +112,11 @@ class State(NamedTuple):
     deviation_m: NDArray[np.float64]  # route progress made while more than 15 m off
     blocked_ticks: NDArray[np.int32]
     counts: NDArray[np.int32]  # (E, EVENT_KINDS) events so far, by EventKind
+    pace_from_m: NDArray[np.float64]  # route metres done at the last checkpoint
+    pace_ego: NDArray[np.float64]  # sum of its speed [m/s] since then, over ticks with traffic near
+    pace_traffic: NDArray[np.float64]  # sum of the mean speed of the traffic near it
+    checkpoint: NDArray[np.int32]  # checkpoints so far
+    pace_share: NDArray[np.float64]  # (E, CHECKPOINTS) ego's share of the traffic's pace, up to 1
     # scenarios (G,)
     scenario_step: NDArray[np.int8]  # AHEAD, then the steps of its family, then DONE
     scenario_tick: NDArray[np.int64]  # at which that step began
@@ -189,6 +195,10 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         "deviation_m": (_F8, egos),
         "blocked_ticks": (_I4, egos),
         "counts": (_I4, (*egos, EVENT_KINDS)),
+        "pace_from_m": (_F8, egos),
+        **dict.fromkeys(("pace_ego", "pace_traffic"), (_F8, egos)),
+        "checkpoint": (_I4, egos),
+        "pace_share": (_F8, (*egos, CHECKPOINTS)),
         "scenario_step": (_I1, triggers),
         "scenario_tick": (_I8, triggers),
         "scenario_m": (_F8, triggers),

@@ -87,7 +87,14 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
                 note_ego_arrival(state, scenery.lanes, ego)
                 advance_progress(state, scenery.routes, ego)
                 n = detect_events(
-                    state, scenery.lanes, scenery.signals, scenery.routes, ego, out, n
+                    state,
+                    scenery.lanes,
+                    scenery.signals,
+                    scenery.routes,
+                    ego,
+                    vehicle_end,
+                    out,
+                    n,
                 )
     return n
 

@@ -186,6 +186,80 @@ def test_messages_read_as_carlas():
     assert found["route_timeout"] == ["Route timeout."]
 
 
+def test_the_layout_of_2_x_has_its_fields_rounded_as_there():
+    slow = event(EventKind.MIN_SPEED, value=87.654321)
+    outside = event(EventKind.OUTSIDE_LANES, value=12.3456)
+    first = route(
+        score=Score(route_completion=50.0, infraction_score=1 / 3),
+        status="Failed - Agent timed out",
+        events=(slow, outside, event(EventKind.TIMEOUT)),
+        length_m=2000.12345,
+        keypoints_m=1.0,
+    )
+    second = route(index=1, seed=1, status="Perfect", length_m=1000.0)
+    content = carla_results(run_of(first, second, rules="carla-2.1"))
+    one, two = content["_checkpoint"]["records"]
+    assert list(one) == [
+        "index",
+        "route_id",
+        "status",
+        "num_infractions",
+        "infractions",
+        "scores",
+        "meta",
+    ]
+    assert [record["route_id"] for record in (one, two)] == [
+        "RouteScenario_7_rep0",
+        "RouteScenario_7_rep1",
+    ]
+    assert set(one["infractions"]) == {
+        *carla_results(run_of(RED))["_checkpoint"]["records"][0]["infractions"],
+        "min_speed_infractions",
+        "yield_emergency_vehicle_infractions",
+        "scenario_timeouts",
+    }
+    assert one["infractions"]["min_speed_infractions"] == [
+        "Average speed is 87.65% of the surrounding traffic's one"
+    ]
+    assert (one["num_infractions"], two["num_infractions"]) == (3, 0)
+    assert one["scores"]["score_penalty"] == 0.333333
+    assert one["meta"]["route_length"] == 2000.123  # of the dense route
+    whole = content["_checkpoint"]["global_record"]
+    assert set(whole) == {
+        "index",
+        "route_id",
+        "status",
+        "infractions",
+        "scores_mean",
+        "scores_std_dev",
+        "meta",
+    }
+    assert whole["scores_mean"]["score_route"] == 75.0
+    assert whole["status"] == "Failed"
+    # two kilometres driven in all; off-road is in kilometres, not a rate
+    assert whole["infractions"]["min_speed_infractions"] == 0.5
+    assert whole["infractions"]["outside_route_lanes"] == 0.012
+    assert content["labels"] == [
+        *LABELS,
+        "Yield emergency vehicles infractions",
+        "Scenario timeouts",
+        "Min speed infractions",
+    ]
+    assert content["values"][0] == str(whole["scores_mean"]["score_composed"])
+    assert content["values"][-1] == "0.5"
+    assert content["entry_status"] == "Finished"
+
+
+def test_2_x_counts_routes_that_were_not_driven_as_nought_and_a_single_one_without_deviation():
+    half = carla_results(run_of(route(status="Perfect"), planned=2, rules="carla-2.0"))
+    assert half["entry_status"] == "Started"
+    assert half["_checkpoint"]["global_record"]["scores_mean"]["score_composed"] == 50.0
+    one = carla_results(run_of(route(status="Perfect"), rules="carla-2.0"))
+    assert one["_checkpoint"]["global_record"]["status"] == "Perfect"
+    assert one["_checkpoint"]["global_record"]["scores_std_dev"]["score_route"] == 0
+    assert one["eligible"] is True
+
+
 def test_a_run_cut_short_is_not_eligible_and_says_so():
     content = carla_results(run_of(route(), planned=4))
     assert content["entry_status"] == "Finished with missing data"

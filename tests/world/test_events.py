@@ -54,7 +54,7 @@ class Street:
         state.yaw[0], state.speed[0] = yaw, speed
         locate_ego(state, self.lanes, 0)
         advance_progress(state, self.routes, 0)
-        n = detect_events(state, self.lanes, self.signals, self.routes, 0, out, 0)
+        n = detect_events(state, self.lanes, self.signals, self.routes, 0, 1, out, 0)
         self.rows += list(out[:n])
         return [EventKind(int(row[0])) for row in out[:n]]
 

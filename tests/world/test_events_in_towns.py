@@ -40,7 +40,7 @@ def fines(town, state, poses, light):
         state.tick[()] += 1
         state.x[0], state.y[0], state.z[0], state.yaw[0] = x, y, z, yaw
         locate_ego(state, town.lanes, 0)
-        n = detect_events(state, town.lanes, town.signals, routes, 0, out, n)
+        n = detect_events(state, town.lanes, town.signals, routes, 0, 1, out, n)
     return [(EventKind(int(row[0])), int(row[6])) for row in out[:n]]
 
 

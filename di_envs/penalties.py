@@ -1,0 +1,120 @@
+"""What infractions cost under each rule set, as data, and the infraction score that they make.
+
+The reward and the leaderboard's score go by the same table and the same arithmetic. A change that
+can move a score is a new name, never an edit of an old one. `docs/rules.md` says where the numbers
+are from and what CARLA's own code does besides.
+
+Source: CARLA Leaderboard, statistics managers of the branches `leaderboard-1.0`, `leaderboard-2.0`
+and `leaderboard-2.1` (numbers; written anew).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+
+from di_envs.world.kinds import EventKind
+
+
+class Form(StrEnum):
+    """How infractions combine."""
+
+    PRODUCT = "product"  # the score is multiplied by each one's factor
+    SUM = "sum"  # the score is 1 / (1 + the sum of their costs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Penalties:
+    """Costs of one rule set.
+
+    Attributes:
+        form: How they combine.
+        costs: For PRODUCT each kind's factor, within (0, 1]; for SUM what it adds, above 0.
+        min_speed: What standing still from one checkpoint to the next would take: from the factor
+            1, or add to the sum; in proportion for an ego slower than the traffic. 0 where the
+            minimum speed does not count.
+    """
+
+    form: Form
+    costs: Mapping[EventKind, float]
+    min_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        for kind, cost in self.costs.items():
+            if not (0.0 < cost <= 1.0 if self.form == Form.PRODUCT else cost > 0.0):
+                wanted = "in (0, 1]" if self.form == Form.PRODUCT else "above 0"
+                raise ValueError(f"the cost of {kind.name} must be {wanted}, not {cost}")
+        if not 0.0 <= self.min_speed < 1.0:
+            raise ValueError(f"min_speed must be in [0, 1), not {self.min_speed}")
+        object.__setattr__(self, "costs", MappingProxyType(dict(self.costs)))
+
+    @property
+    def scored(self) -> tuple[EventKind, ...]:
+        """The kinds that cost something each time, in the order of `EventKind`."""
+        kinds = [*self.costs, *([EventKind.MIN_SPEED] if self.min_speed else [])]
+        return tuple(sorted(kinds))
+
+    def infraction_score(
+        self,
+        counts: Sequence[int] | Mapping[EventKind, int],
+        pace_shares: Iterable[float] = (),
+        outside_shares: Iterable[float] = (),
+    ) -> float:
+        """The infraction score, 0..1: the same bits whatever the order of the infractions.
+
+        Args:
+            counts: How often each kind happened, by `EventKind`.
+            pace_shares: At each checkpoint the ego's share of the traffic's mean speed, 0..1.
+            outside_shares: The parts of the way, 0..1, outside lanes; at most one, as a rule.
+        """
+        slow = [1.0 - share for share in pace_shares if share < 1.0] if self.min_speed else []
+        costs = [cost for kind, cost in self.costs.items() for _ in range(counts[kind])]
+        factors = [1.0 - share for share in outside_shares]
+        if self.form == Form.PRODUCT:
+            factors += costs + [1.0 - self.min_speed * part for part in slow]
+            total = 0.0
+        else:
+            total = math.fsum(costs + [self.min_speed * part for part in slow])
+        # multiplied in order of size: no order of events can change a bit
+        return math.prod(sorted(factors)) / (1.0 + total)
+
+
+PENALTIES: Mapping[str, Penalties] = MappingProxyType(
+    {
+        "carla-1.0": Penalties(
+            form=Form.PRODUCT,
+            costs={
+                EventKind.COLLISION_WALKER: 0.50,
+                EventKind.COLLISION_VEHICLE: 0.60,
+                EventKind.COLLISION_STATIC: 0.65,
+                EventKind.RED_LIGHT: 0.70,
+                EventKind.STOP_SIGN: 0.80,
+            },
+        ),
+        "carla-2.0": Penalties(
+            form=Form.PRODUCT,
+            costs={
+                EventKind.COLLISION_WALKER: 0.50,
+                EventKind.COLLISION_VEHICLE: 0.60,
+                EventKind.COLLISION_STATIC: 0.65,
+                EventKind.RED_LIGHT: 0.70,
+                EventKind.STOP_SIGN: 0.80,
+            },
+            min_speed=0.30,
+        ),
+        "carla-2.1": Penalties(
+            form=Form.SUM,
+            costs={
+                EventKind.COLLISION_WALKER: 1.00,
+                EventKind.COLLISION_VEHICLE: 0.70,
+                EventKind.COLLISION_STATIC: 0.60,
+                EventKind.RED_LIGHT: 0.40,
+                EventKind.STOP_SIGN: 0.25,
+            },
+            min_speed=0.40,
+        ),
+    }
+)
