@@ -1,5 +1,5 @@
 # mypy: disallow_untyped_defs=False
-"""What actors look like: each kind of vehicle and walker as a handful of boxes.
+"""What actors look like: each kind of vehicle, walker and prop as a handful of boxes.
 
 A part's place and size are shares of the actor's own box (half length, half width, height), so one
 table serves every size. Far from the ego the small parts are left out.
@@ -24,6 +24,7 @@ _PROP = int(ActorKind.PROP)
 
 # What a part is: BODY takes the actor's own colour
 BODY, GLASS, TYRE, TAIL, LEFT, RIGHT, HEAD, TRIM, TROUSERS, SKIN = range(10)
+EARTH, RUBBLE, CABINET, DISPLAY = range(10, 14)
 
 # Colours of cars, drawn by key: whites, greys and blacks mostly, as on real streets
 _BODIES = np.array(
@@ -51,6 +52,10 @@ _FIXED = np.array(
         (0.20, 0.20, 0.21),  # trim
         (0.16, 0.17, 0.24),  # trousers
         (0.72, 0.53, 0.42),  # skin
+        (0.30, 0.23, 0.16),  # earth
+        (0.47, 0.43, 0.37),  # rubble
+        (0.62, 0.07, 0.08),  # cabinet
+        (0.58, 0.66, 0.70),  # display
     ],
     np.float32,
 )
@@ -131,6 +136,24 @@ _WALKER: list[tuple[float, ...]] = [
     (SKIN, 0.05, 0, 0.925, 0.42, 0.42, 0.075, 0),
 ]
 _POLE: list[tuple[float, ...]] = [(TRIM, 0, 0, 0.5, 0.55, 0.55, 0.5, 0)]
+# Earth spilt over the road, with lumps in it; low enough to be driven over
+_DEBRIS: list[tuple[float, ...]] = [
+    (EARTH, -0.10, 0.05, 0.20, 0.72, 0.58, 0.20, 0),
+    (EARTH, 0.42, -0.35, 0.15, 0.50, 0.42, 0.15, 0),
+    (EARTH, -0.48, 0.48, 0.13, 0.46, 0.45, 0.13, 0),
+    (RUBBLE, 0.12, 0.12, 0.65, 0.20, 0.18, 0.35, 0),
+    (RUBBLE, -0.40, -0.22, 0.52, 0.16, 0.14, 0.30, 1),
+    (RUBBLE, 0.62, 0.50, 0.40, 0.12, 0.14, 0.40, 1),
+    (RUBBLE, -0.78, 0.60, 0.34, 0.11, 0.10, 0.34, 1),
+    (RUBBLE, 0.80, -0.62, 0.30, 0.13, 0.12, 0.30, 1),
+]
+# Its front is where its yaw points to
+_VENDING_MACHINE: list[tuple[float, ...]] = [
+    (CABINET, 0, 0, 0.5, 0.98, 1.0, 0.5, 0),
+    (DISPLAY, 0.97, -0.22, 0.60, 0.03, 0.62, 0.30, 0),
+    (TRIM, 0.97, 0.68, 0.58, 0.03, 0.16, 0.14, 1),
+    (TRIM, 0.97, -0.10, 0.15, 0.03, 0.60, 0.06, 1),
+]
 _BY_KIND: dict[ActorKind, tuple[list[tuple[float, ...]], Tag]] = {
     ActorKind.CAR: (_CAR, Tag.CAR),
     ActorKind.VAN: (_VAN, Tag.CAR),
@@ -140,6 +163,8 @@ _BY_KIND: dict[ActorKind, tuple[list[tuple[float, ...]], Tag]] = {
     ActorKind.BICYCLE: (_BICYCLE, Tag.BICYCLE),
     ActorKind.WALKER: (_WALKER, Tag.PEDESTRIANS),
     ActorKind.PROP: (_POLE, Tag.POLES),
+    ActorKind.DEBRIS: (_DEBRIS, Tag.STATIC),
+    ActorKind.VENDING_MACHINE: (_VENDING_MACHINE, Tag.DYNAMIC),
 }
 _RIDER_PARTS = (TROUSERS, SKIN)
 

@@ -214,3 +214,29 @@ def test_too_many_boxes_for_the_room_are_left_out(world, scene):
     boxes = empty_boxes(50)
     collect_boxes(scene, world.view.state, 0, 500.0, boxes)
     assert boxes.count[0] == 50
+
+
+@pytest.mark.parametrize(
+    ("kind", "tag", "size"),
+    [
+        (ActorKind.DEBRIS, Tag.STATIC, (1.0, 0.9, 0.08)),
+        (ActorKind.VENDING_MACHINE, Tag.DYNAMIC, (0.45, 0.55, 1.9)),
+    ],
+)
+def test_props_of_scenarios_fill_their_boxes_and_carry_carlas_tags(world, scene, kind, tag, size):
+    snapshot = world.save()
+    state = views_of(snapshot.record)
+    prop = int(np.flatnonzero(state.kind == ActorKind.CAR)[-1])
+    state.x[prop], state.y[prop], state.z[prop] = state.x[0] + 10.0, state.y[0], 0.25
+    state.yaw[prop], state.kind[prop] = math.pi / 2.0, kind
+    state.half_length[prop], state.half_width[prop], state.height[prop] = size
+    world.restore(snapshot)
+    boxes = collected(world, scene)
+    rows = np.flatnonzero(boxes.instance[: boxes.count[0]] == prop + 1)
+    assert (boxes.tag[rows] == tag).all()
+    centre, half = boxes.centre[rows], boxes.half[rows]
+    half = np.stack([half[:, 1], half[:, 0], half[:, 2]], axis=1)  # it is turned by a right angle
+    low, high = (centre - half).min(axis=0), (centre + half).max(axis=0)
+    middle = np.array([state.x[prop], state.y[prop], 0.25])
+    np.testing.assert_allclose(low, middle - [size[1], size[0], 0.0], atol=0.25)
+    np.testing.assert_allclose(high, middle + [size[1], size[0], size[2]], atol=0.25)
