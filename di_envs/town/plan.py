@@ -28,7 +28,7 @@ class ScenarioTrigger:
     Attributes:
         type: The Leaderboard 1.0's number of the scenario: 1, 3, 4, 7, 8, 9 or 10.
         subtype: CARLA's name of the variant, such as `S4left`; empty where there is one only.
-        point: Index of the dense route point that triggers it.
+        point: Index of the dense route point nearest to its trigger.
     """
 
     type: int

@@ -3,13 +3,13 @@
 A trigger belongs to a route that passes within 2 m and 10 degrees of it, counted in three
 dimensions, so one on a bridge is not met below it. Of several at one place the one with the
 highest number is taken. Scenarios 4, 7, 8 and 9 need a turn: the route's next one decides which
-variant it is, and whether there is any. A scenario begins at the first route point within 1.5 m of
-its trigger.
+variant it is, and whether there is any. A scenario begins once the ego is within 1.5 m of its
+trigger, along the route; a trigger that no route point comes so near to never begins.
 
 Source: behaviour of `leaderboard/utils/route_parser.py`, `leaderboard/scenarios/route_scenario.py`
 (CARLA Leaderboard 1.0, MIT licence) and of `ScenarioTriggerer` (CARLA ScenarioRunner, MIT licence);
-our own code. Unlike theirs, the first point within 1.5 m is sought from the matched one on, and so
-never on an earlier crossing of the same place. Of several at one place theirs falls back to a
+our own code. Unlike theirs, the point is sought from the matched one on, and so never on an earlier
+crossing of the same place. Of several at one place theirs falls back to a
 random one where the highest is too near to one chosen before, ours to the next lower number.
 """
 
@@ -28,7 +28,7 @@ from di_envs.town.trigger_files import PlacedScenario
 
 MATCH_M = 2.0
 MATCH_RAD = math.radians(10.0)
-START_M = 1.5  # of the route point nearest to the ego from the trigger
+START_M = 1.5  # from the trigger to the route point nearest to the ego
 STAGED = (1, 3, 4, 7, 8, 9, 10)  # 2, 5 and 6 are in no file of the Town05 benchmark
 
 # The variants by the command at the next turn; numbers that are not here have one only.
@@ -146,14 +146,16 @@ def _one_a_group(groups: list[list[_Candidate]]) -> list[_Candidate]:
 def _start(
     points: NDArray[np.float64], candidate: _Candidate, taken: dict[int, _Candidate]
 ) -> int | None:
-    """The first route point near enough to begin at, None where the route stays away.
+    """The route point nearest to a trigger, None where the route stays away from it.
 
     Where another scenario begins there, this one does a point later.
     """
     after = points[candidate.point :, :3]
     away_m = np.linalg.norm(after - np.array(candidate.place[1:4]), axis=1)
-    near = np.flatnonzero(away_m < START_M)
-    if not len(near):
+    near = away_m < START_M
+    if not near.any():
         return None
-    first = candidate.point + int(near[0])
-    return next((point for point in range(first, len(points)) if point not in taken), None)
+    first = int(np.argmax(near))
+    passed = first + int(np.argmax(np.append(~near[first:], True)))  # it may come back later
+    nearest = candidate.point + first + int(np.argmin(away_m[first:passed]))
+    return next((point for point in range(nearest, len(points)) if point not in taken), None)

@@ -237,6 +237,8 @@ def test_props_of_scenarios_fill_their_boxes_and_carry_carlas_tags(world, scene,
     centre, half = boxes.centre[rows], boxes.half[rows]
     half = np.stack([half[:, 1], half[:, 0], half[:, 2]], axis=1)  # it is turned by a right angle
     low, high = (centre - half).min(axis=0), (centre + half).max(axis=0)
-    middle = np.array([state.x[prop], state.y[prop], 0.25])
-    np.testing.assert_allclose(low, middle - [size[1], size[0], 0.0], atol=0.25)
-    np.testing.assert_allclose(high, middle + [size[1], size[0], size[2]], atol=0.25)
+    middle, reach = np.array([state.x[prop], state.y[prop]]), np.array([size[1], size[0]])
+    np.testing.assert_allclose(low[:2], middle - reach, atol=0.25)
+    np.testing.assert_allclose(high[:2], middle + reach, atol=0.25)
+    assert low[2] == pytest.approx(0.25, abs=0.01)
+    assert high[2] == pytest.approx(0.25 + size[2], abs=0.01)

@@ -42,8 +42,8 @@ def met(*placed: PlacedScenario, option: NDArray[np.int8] = FOLLOW) -> list[tupl
     return [(trigger.type, trigger.subtype, trigger.point) for trigger in found]
 
 
-def test_a_trigger_begins_at_the_first_point_within_a_metre_and_a_half() -> None:
-    assert met(at(3, 20.0)) == [(3, "", 19)]
+def test_a_trigger_is_met_at_the_nearest_point_if_that_is_within_a_metre_and_a_half() -> None:
+    assert met(at(3, 20.3)) == [(3, "", 20)]
     assert met(at(3, 20.0, 1.4)) == [(3, "", 20)]
 
 
@@ -63,18 +63,18 @@ def test_a_trigger_beside_above_or_across_the_route_is_not_met(place: PlacedScen
 
 
 def test_yaw_is_compared_around_the_circle() -> None:
-    assert met(at(3, 20.0, yaw_deg=355.0)) == [(3, "", 19)]
+    assert met(at(3, 20.0, yaw_deg=355.0)) == [(3, "", 20)]
 
 
 def test_of_several_at_one_place_the_highest_number_wins() -> None:
-    assert met(at(3, 20.0), at(10, 20.5), at(1, 20.0)) == [(10, "", 20)]
+    assert met(at(3, 20.0), at(10, 20.6), at(1, 20.0)) == [(10, "", 21)]
 
 
 def test_a_scenario_that_the_turn_does_not_fit_leaves_the_place_to_another() -> None:
     placed = (at(7, 20.0), at(8, 20.0), at(9, 20.0))
-    assert met(*placed, option=turning(RoadOption.LEFT)) == [(8, "S8left", 19)]
-    assert met(*placed, option=turning(RoadOption.RIGHT)) == [(9, "S9right", 19)]
-    assert met(*placed, option=turning(RoadOption.STRAIGHT)) == [(7, "S7opposite", 19)]
+    assert met(*placed, option=turning(RoadOption.LEFT)) == [(8, "S8left", 20)]
+    assert met(*placed, option=turning(RoadOption.RIGHT)) == [(9, "S9right", 20)]
+    assert met(*placed, option=turning(RoadOption.STRAIGHT)) == [(7, "S7opposite", 20)]
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_a_scenario_that_the_turn_does_not_fit_leaves_the_place_to_another() -> 
     ],
 )
 def test_the_next_turn_names_the_variant(number: int, command: RoadOption, subtype: str) -> None:
-    assert met(at(number, 20.0), option=turning(command)) == [(number, subtype, 19)]
+    assert met(at(number, 20.0), option=turning(command)) == [(number, subtype, 20)]
 
 
 def test_a_route_that_turns_no_more_or_otherwise_has_none_that_need_a_turn() -> None:
@@ -97,17 +97,17 @@ def test_a_route_that_turns_no_more_or_otherwise_has_none_that_need_a_turn() -> 
 
 
 def test_two_that_would_begin_at_one_point_begin_one_after_the_other() -> None:
-    # 2.2 m apart, so two places, both within 1.5 m of the point at 20 m
+    # 2.2 m apart, so two places, both nearest to the point at 20 m
     assert met(at(3, 20.0, 1.1), at(4, 20.0, -1.1), option=turning(RoadOption.LEFT)) == [
-        (3, "", 20 - 1),
-        (4, "S4left", 20),
+        (3, "", 20),
+        (4, "S4left", 21),
     ]
 
 
 def test_a_route_that_passes_twice_begins_it_the_first_time() -> None:
     twice = np.concatenate([EAST, EAST])
     found = match_scenarios(twice, np.concatenate([FOLLOW, FOLLOW]), [at(3, 20.0)])
-    assert found == (ScenarioTrigger(type=3, subtype="", point=19),)
+    assert found == (ScenarioTrigger(type=3, subtype="", point=20),)
 
 
 def official(shared: Path, routes: str) -> tuple[RoutePlan, ...]:
