@@ -13,7 +13,15 @@ from di_envs.sensors.drops import add_glow, add_rain
 from di_envs.sensors.face_shading import colour_face, colour_sky
 from di_envs.sensors.ground_shading import colour_ground, shade_row
 from di_envs.sensors.projection import place_camera, project_boxes, project_shadows
-from di_envs.sensors.spans import fill, headlights, hit_box, store_row
+from di_envs.sensors.spans import (
+    beam_span,
+    fill,
+    hit_box,
+    hit_upright,
+    multiply,
+    run_end,
+    store_row,
+)
 from di_envs.sensors.tags import Tag
 
 FAR_M = 1000.0  # depth of the sky
@@ -83,14 +91,13 @@ def _row(studio, canvas, y, boxes):
     x, width = 0, depth.shape[0]
     while x < width:
         code = canvas.code[x]
-        end = low if x < low else (x + 1 if x < high else width)
-        while end < high and canvas.code[end] == code:
-            end += 1
+        # before the first column that a box may cover all is one code, and after the last one
+        end = run_end(canvas.code, max(x, low - 1), high) if x < high else width
         if code < 0:
             if with_who:
                 fill(who[x:end], np.int32(0))
             if ground:
-                colour_ground(studio, canvas, x, end, y, v, far, drop, tag)
+                colour_ground(studio, canvas, x, end, y, far, drop, tag)
             else:
                 colour_sky(canvas, look, x, end, drop)
                 if with_tag:
@@ -105,10 +112,10 @@ def _row(studio, canvas, y, boxes):
         x = end
     if cam[15] > 0.0 and look.numbers[5] > 0.0:
         u0, du = F((0.5 - cam[13]) / cam[12]), F(1.0 / cam[12])
-        gain = F(6.0 * cam[15])
-        headlights(canvas.red, depth, gain, u0, du)
-        headlights(canvas.green, depth, gain, u0, du)
-        headlights(canvas.blue, depth, gain, u0, du)
+        beam_span(canvas.shadow, depth, F(6.0 * cam[15]), u0, du)
+        multiply(canvas.red, canvas.shadow)
+        multiply(canvas.green, canvas.shadow)
+        multiply(canvas.blue, canvas.shadow)
     store_row(canvas.red, canvas.green, canvas.blue, canvas.rgb[y])
 
 
@@ -123,10 +130,17 @@ def _hit_boxes(studio, canvas, y, boxes):
         a, b = seen.rect[k, 0], seen.rect[k, 1]
         low, high = min(low, a), max(high, b)
         ray, half = seen.ray[k], studio.boxes.half[seen.source[k]]
-        hit_box(
-            depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k),
-            ray[0], ray[1], ray[2],
-            ray[3] + row * ray[9], ray[4] + row * ray[10], ray[5] + row * ray[11],
-            ray[6], ray[7], ray[8], half[0], half[1], half[2],
-        )  # fmt: skip
+        at_row_x, at_row_y = ray[3] + row * ray[9], ray[4] + row * ray[10]
+        if studio.boxes.pitch[seen.source[k]] == F(0.0):
+            hit_upright(
+                depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), ray[0], ray[1], ray[2],
+                at_row_x, at_row_y, ray[5] + row * ray[11], ray[6], ray[7],
+                half[0], half[1], half[2],
+            )  # fmt: skip
+        else:
+            hit_box(
+                depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), ray[0], ray[1], ray[2],
+                at_row_x, at_row_y, ray[5] + row * ray[11], ray[6], ray[7], ray[8],
+                half[0], half[1], half[2],
+            )  # fmt: skip
     return low, high

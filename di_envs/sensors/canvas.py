@@ -32,7 +32,11 @@ class Canvas(NamedTuple):
     blue: NDArray[np.float32]
     u: NDArray[np.float32]  # places in the raster
     v: NDArray[np.float32]
-    samples: NDArray[np.float32]  # (3, W + 2) before they are spread
+    samples: NDArray[np.float32]  # (4, W + 2) colours and water before they are spread
+    index: NDArray[np.int32]  # (W + 2,) of texels
+    share: NDArray[np.int32]  # (W + 2,) between them
+    found: NDArray[np.uint32]  # (4 W + 8,) texels
+    water: NDArray[np.float32]  # (W,) how deep it stands on the ground
     shadow: NDArray[np.float32]
     last: NDArray[np.uint8]
     code: NDArray[np.int32]
@@ -57,7 +61,7 @@ def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
         camera.x_m, camera.y_m, camera.z_m, camera.yaw_rad, camera.pitch_rad,
         camera.focal_px, width / 2.0, height / 2.0, beam,
     )  # fmt: skip
-    rows = [np.zeros(width + 2, np.float32) for _ in range(6)]
+    rows = [np.zeros(width + 2, np.float32) for _ in range(7)]
     return Canvas(
         mount=np.array(mount, np.float64),
         cam=np.zeros(16),
@@ -70,7 +74,11 @@ def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
         blue=rows[2][:width],
         u=rows[3],
         v=rows[4],
-        samples=np.zeros((3, width + 2), np.float32),
+        samples=np.zeros((4, width + 2), np.float32),
+        index=np.zeros(width + 2, np.int32),
+        share=np.zeros(width + 2, np.int32),
+        found=np.zeros(4 * width + 8, np.uint32),
+        water=rows[6][:width],
         shadow=rows[5][:width],
         last=np.zeros(width, np.uint8),
         code=np.zeros(width, np.int32),

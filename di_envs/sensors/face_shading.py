@@ -17,7 +17,6 @@ from di_envs.sensors.spans import (
     haze_span,
     mottle,
     multiply,
-    tags_of,
     windows,
 )
 
@@ -90,10 +89,7 @@ def _deck(studio, canvas, code, a, b, y, tag):
     """Colours the top of a deck by the raster of what is elevated."""
     seen, look = studio.seen, studio.look
     over = seen.ray[code // 6, 2] - studio.boxes.half[seen.source[code // 6], 2]
-    with_last = canvas.tag.shape[0] > 0
-    colour_by_raster(canvas, studio.scene.deck, a, b, y, max(0.2, np.float64(over)), with_last)
-    if with_last:
-        tags_of(canvas.last[a:b], tag[a:b])
+    colour_by_raster(canvas, studio.scene.deck, a, b, y, max(0.2, np.float64(over)), 0.0, tag)
     wet = 1.0 - 0.38 * look.numbers[2]
     depth = canvas.depth[y, a:b]
     for q in range(3):

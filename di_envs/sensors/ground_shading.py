@@ -11,17 +11,18 @@ import math
 import numpy as np
 
 from di_envs.kernels import kernel
-from di_envs.sensors.spans import (
-    fill,
+from di_envs.sensors.raster_spans import (
+    add_colours,
+    fetch,
     last_bytes,
-    light_ground,
     plane_points,
     puddles,
-    sample,
-    shade_span,
     spread,
     tags_of,
+    texel_places,
+    water_depths,
 )
+from di_envs.sensors.spans import fill, light_ground, shade_span
 from di_envs.sensors.surfaces import LEVELS, TEXEL_M
 
 _TAPS = 3  # samples along the road for a row that is far longer than wide
@@ -29,23 +30,30 @@ F = np.float32
 
 
 @kernel
-def colour_ground(studio, canvas, a, b, y, v, far, drop, tag):
+def colour_ground(studio, canvas, a, b, y, far, drop, tag):
     """Colours the pixels [a, b) of a row, all of the ground plane."""
-    with_last = canvas.tag.shape[0] > 0 or studio.look.numbers[3] > 0.0
+    water_level = math.floor(3.0 * studio.look.numbers[3] + 1.0)
+    if studio.look.numbers[3] <= 0.0:
+        water_level = 0.0
     over = canvas.cam[2] - studio.scene.base_z[0]
-    colour_by_raster(canvas, studio.scene.ground, a, b, y, over, with_last)
-    if with_last:
-        if canvas.tag.shape[0] > 0:
-            tags_of(canvas.last[a:b], tag[a:b])
+    colour_by_raster(canvas, studio.scene.ground, a, b, y, over, water_level, tag)
     _light_plane(canvas, studio.look, a, b, far, drop)
 
 
 @kernel
-def colour_by_raster(canvas, raster, a, b, y, over, with_last):
-    """Colours a span by a raster that lies level, `over` metres below the camera.
+def colour_by_raster(canvas, raster, a, b, y, over, water_level, tag):
+    """Colours a span by a raster that lies level, and tags it where that is asked for.
 
     Where a texel is wider than some pixels, only every second, fourth or eighth is sampled and
     those between are filled in. Where a pixel is longer than wide, several samples are taken.
+
+    Args:
+        canvas: `Canvas`; its depths are known.
+        raster: `Raster`.
+        a, b, y: The pixels [a, b) of row y.
+        over: How far below the camera the raster lies [m].
+        water_level: Up to where there are puddles, 0 for none; their depths go to `canvas.water`.
+        tag: (W,) the row's tags, written if the canvas has tags.
     """
     cam = canvas.cam
     focal = cam[12]
@@ -62,32 +70,39 @@ def colour_by_raster(canvas, raster, a, b, y, over, with_last):
     while stride < 8 and wide * stride * 3.0 <= TEXEL_M * (1 << level):
         stride *= 2
     n = b - a if stride == 1 else (b - a - 1) // stride + 2
-    u, w = canvas.u[:n], canvas.v[:n]
+    u, w, index, share = canvas.u[:n], canvas.v[:n], canvas.index[:n], canvas.share[:n]
     red, green, blue = canvas.samples[0, :n], canvas.samples[1, :n], canvas.samples[2, :n]
+    water = canvas.samples[3, :n]
     if stride == 1:
         red, green, blue = canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b]
+        water = canvas.water[a:b]
     fill(red, F(0.0))
     fill(green, F(0.0))
     fill(blue, F(0.0))
     u0 = (0.5 - cam[13]) / focal
     x0, y0 = cam[0] - raster.origin[0], cam[1] - raster.origin[1]
+    start, width, height = raster.start[level], raster.width[level], raster.height[level]
     for tap in range(taps):
         shift = ((tap + 0.5) / taps - 0.5) * long / flat_m
         _places(canvas, u, depth, stride, (x0 + shift * gx, gx + u0 * cam[6], cam[6]), a)
         _places(canvas, w, depth, stride, (y0 + shift * gy, gy + u0 * cam[7], cam[7]), a)
-        sample(
-            u, w, red, green, blue, raster.texels, raster.start[level], raster.width[level],
-            raster.height[level], F(1.0 / (1 << level)), F(1.0 / taps),
-        )  # fmt: skip
+        texel_places(u, w, index, share, width, height, F(1.0 / (1 << level)))
+        fetch(index, canvas.found, raster.texels, start, width)
+        add_colours(canvas.found, share, red, green, blue, F(1.0 / taps))
+        if water_level > 0.0 and tap == taps // 2:
+            water_depths(canvas.found, share, water, F(water_level))
     if stride > 1:
         spread(red, canvas.red[a:b], stride)
         spread(green, canvas.green[a:b], stride)
         spread(blue, canvas.blue[a:b], stride)
-    if with_last:
+        if water_level > 0.0:
+            spread(water, canvas.water[a:b], stride)
+    if canvas.tag.shape[0] > 0:
         u, w = canvas.u[: b - a], canvas.v[: b - a]
         _places(canvas, u, depth, 1, (x0, gx + u0 * cam[6], cam[6]), a)
         _places(canvas, w, depth, 1, (y0, gy + u0 * cam[7], cam[7]), a)
         last_bytes(u, w, canvas.last[a:b], raster.texels, raster.width[0], raster.height[0])
+        tags_of(canvas.last[a:b], tag[a:b])
 
 
 @kernel
@@ -162,7 +177,6 @@ def _light_plane(canvas, look, a, b, far, drop):
     if numbers[3] > 0.0:
         share = F((0.25 + 0.6 * graze) * clear)
         puddles(
-            canvas.last[a:b], canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b],
-            np.uint8(3.0 * numbers[3] + 1.0), share,
+            canvas.water[a:b], canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b], share,
             F(235.0 * look.horizon[0]), F(235.0 * look.horizon[1]), F(235.0 * look.horizon[2]),
         )  # fmt: skip
