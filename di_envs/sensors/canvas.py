@@ -33,7 +33,7 @@ class Canvas(NamedTuple):
     u: NDArray[np.float32]  # places in the raster
     v: NDArray[np.float32]
     samples: NDArray[np.float32]  # (4, W + 2) colours and water before they are spread
-    index: NDArray[np.int32]  # (W + 2,) of texels
+    texel: NDArray[np.int32]  # (W + 2,) first one of four, in a level
     share: NDArray[np.int32]  # (W + 2,) between them
     found: NDArray[np.uint32]  # (4 W + 8,) texels
     water: NDArray[np.float32]  # (W,) how deep it stands on the ground
@@ -75,7 +75,7 @@ def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
         u=rows[3],
         v=rows[4],
         samples=np.zeros((4, width + 2), np.float32),
-        index=np.zeros(width + 2, np.int32),
+        texel=np.zeros(width + 2, np.int32),
         share=np.zeros(width + 2, np.int32),
         found=np.zeros(4 * width + 8, np.uint32),
         water=rows[6][:width],

@@ -70,7 +70,7 @@ def colour_by_raster(canvas, raster, a, b, y, over, water_level, tag):
     while stride < 8 and wide * stride * 3.0 <= TEXEL_M * (1 << level):
         stride *= 2
     n = b - a if stride == 1 else (b - a - 1) // stride + 2
-    u, w, index, share = canvas.u[:n], canvas.v[:n], canvas.index[:n], canvas.share[:n]
+    u, w, index, share = canvas.u[:n], canvas.v[:n], canvas.texel[:n], canvas.share[:n]
     red, green, blue = canvas.samples[0, :n], canvas.samples[1, :n], canvas.samples[2, :n]
     water = canvas.samples[3, :n]
     if stride == 1:
