@@ -18,6 +18,7 @@ from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.lists import Agents, Suites
 from leaderboard.commands.show import SHOW_HELP, Show
+from leaderboard.commands.verify import VERIFY_HELP, Verify
 
 HELP = """Drive agents in closed loop and score them as the CARLA Leaderboard does.
 
@@ -26,12 +27,14 @@ First steps:
   driveinsight suites                                     where
   driveinsight evaluate --agent expert --suite town05_tiny
   driveinsight show results/expert-town05_tiny            the table again
+  driveinsight verify results/expert-town05_tiny          does the claim stand?
   driveinsight drive --agent expert --suite town05_tiny --video out.mp4"""
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_HELP)]
     | Annotated[Drive, tyro.conf.subcommand("drive", description=DRIVE_HELP)]
     | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_HELP)]
+    | Annotated[Verify, tyro.conf.subcommand("verify", description=VERIFY_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
 )
@@ -41,8 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command.
 
     Returns:
-        The exit code: 0; 1 if a simulation or a worker process died; 2 for a wrong request; 130
-        if interrupted.
+        The exit code: 0; 1 if a simulation or a worker process died, or a claim does not stand; 2
+        for a wrong request; 130 if interrupted.
     """
     command: Command = tyro.cli(Command, prog="driveinsight", description=HELP, args=arguments)
     try:

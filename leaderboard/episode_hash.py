@@ -1,4 +1,4 @@
-"""Hashes of all that an agent saw, earned and caused: two episodes are equal when these are."""
+"""Hashes of all that an agent saw, earned, caused and was: two episodes are equal if these are."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.world.state import State
 from di_envs.world.world import Event
 
 _EVENT = struct.Struct("<4q4d")
 _REWARD = struct.Struct("<d")
+_EGO = ("throttle", "steer", "brake", "x", "y", "z", "yaw", "speed")
 _CHECK_BYTES = 4
 
 
 class EpisodeHash:
-    """Three running BLAKE2b digests of 128 bits, fed step by step, and a short one a look."""
+    """Running BLAKE2b digests of 128 bits, fed step by step, and a short one a look."""
 
     def __init__(self) -> None:
         self._observations = hashlib.blake2b(digest_size=16)
         self._rewards = hashlib.blake2b(digest_size=16)
         self._events = hashlib.blake2b(digest_size=16)
+        self._states = hashlib.blake2b(digest_size=16)
         self._checks = bytearray()
 
     def add_observation(self, observation: Mapping[str, Any]) -> None:
@@ -38,6 +41,17 @@ class EpisodeHash:
     def add_events(self, events: Iterable[Event]) -> None:
         for e in events:
             self._events.update(_EVENT.pack(e.kind, e.ego, e.tick, e.other, e.x, e.y, e.z, e.value))
+
+    def add_state(self, state: State, ego: int) -> None:
+        """Adds the controls that an ego holds, where it is and how fast."""
+        self._states.update(b"".join([getattr(state, name)[ego].tobytes() for name in _EGO]))
+
+    def state_hex(self, state: State) -> str:
+        """The digest of the states so far, closed with the whole of `state`."""
+        closed = self._states.copy()
+        for array in state:
+            closed.update(_bytes_of(array))
+        return closed.hexdigest()
 
     def hex(self) -> tuple[str, str, str]:
         """The digests so far of observations, rewards and events."""

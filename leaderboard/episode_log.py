@@ -72,6 +72,7 @@ class EpisodeLog:
         self.controls.append(control.copy())
         self.hashes.add_reward(reward)
         self.hashes.add_events(happened)
+        self.hashes.add_state(self._view.state, self._view.ego)
         self.events += [event_record(event, self._view) for event in happened]
         row = trace_row(self._view)
         ticks, last = round(row[0] / TICK_S), round(self._trace[-1][0] / TICK_S)
@@ -168,6 +169,7 @@ def route_record(
         observation_hash=observation_hash,
         reward_hash=reward_hash,
         event_hash=event_hash,
+        state_hash=log.hashes.state_hex(state),
         controls=pack(log.control_array(), CONTROL_TYPE),
         observation_checks=pack(log.hashes.checks(), CHECK_TYPE),
         trace=log.trace(),

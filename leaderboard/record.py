@@ -86,6 +86,7 @@ class RouteRecord:
         observation_hash: BLAKE2b of every observation in order; so the other two.
         interventions: What was done to the world or to what the agent saw, as text.
         scenarios: How many scenarios of each type were triggered.
+        state_hash: Of the ego at every decision, and of the whole world at the end.
         controls: Every control carried out, packed; see `control_array`.
         observation_checks: A short hash of every observation, packed; see `check_array`.
         trace: Where the ego was, every half second and at the end.
@@ -113,6 +114,7 @@ class RouteRecord:
     event_hash: str
     interventions: tuple[str, ...] = ()
     scenarios: Mapping[str, int] = field(default_factory=dict)
+    state_hash: str = ""
     controls: str = ""
     observation_checks: str = ""
     trace: tuple[TraceRow, ...] = ()

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.route_env import RouteEnv
+from di_envs.sensors.camera_config import CameraConfig, Rig
+from di_envs.sensors.lidar_config import LidarConfig
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event, WorldView
 from leaderboard.episode_log import route_hash
@@ -23,7 +25,7 @@ from leaderboard.jobs import Job
 from leaderboard.record import RouteRecord, RunRecord
 
 CHEAPEST = ("inertial",)  # the group of observations that costs least
-_SENSOR_OPTIONS = ("cameras", "lidar")
+_SENSOR_OPTIONS = ("observations", "cameras", "lidar")
 
 
 class ReplayError(Exception):
@@ -38,6 +40,7 @@ class ReplayStep:
         decision: How many decisions have been carried out: 0 at the start.
         time_s: Game time.
         control: (3,) throttle, steer, brake of the last decision; None at the start.
+        observation: What the environment shows, of the groups that it was made with.
         view: The present world. It shows the next moment once the next step is asked for: copy
             what you keep.
         events: What happened in this step.
@@ -49,6 +52,7 @@ class ReplayStep:
     decision: int
     time_s: float
     control: NDArray[np.float32] | None
+    observation: Mapping[str, Any]
     view: WorldView
     events: tuple[Event, ...]
     reward: float
@@ -71,7 +75,7 @@ def replay_env(
     """
     required: Mapping[str, Any] = run.requires.get("options", {})
     kept = {**required, **run.options}
-    for name in ("observations", *_SENSOR_OPTIONS):
+    for name in _SENSOR_OPTIONS:
         kept.pop(name, None)
     kept["control_dt_s"] = run.options.get("control_dt_s", run.requires["control_dt_s"])
     try:
@@ -84,6 +88,33 @@ def replay_env(
             f"has {env.world.town.content_hash}: give it the same map and signals"
         )
     return env
+
+
+def sensor_options(run: RunRecord) -> dict[str, Any]:
+    """Arguments for `replay_env` that make it show what the agent saw, bit for bit.
+
+    Raises:
+        ReplayError: If the record says of a sensor what this program does not know.
+    """
+    given: Mapping[str, Any] = {**run.requires.get("options", {}), **run.options}
+    options: dict[str, Any] = {"observations": tuple(run.requires["observations"])}
+    try:
+        if "cameras" in given:
+            options["cameras"] = _rig(given["cameras"])
+        if "lidar" in given:
+            lidar = given["lidar"]
+            options["lidar"] = lidar if isinstance(lidar, str) else LidarConfig(**lidar)
+    except (TypeError, KeyError) as error:
+        raise ReplayError(f"the record's sensors cannot be made here: {error}") from error
+    return options
+
+
+def _rig(cameras: str | Mapping[str, Any]) -> str | Rig:
+    """A rig by its name, or of the values that a record keeps of one."""
+    if isinstance(cameras, str):
+        return cameras
+    each = tuple(CameraConfig(**camera) for camera in cameras["cameras"])
+    return Rig(**{**cameras, "cameras": each})
 
 
 def replay(
@@ -104,11 +135,12 @@ def replay(
     """
     controls = _controls(record)
     env = env or replay_env(run)
-    _, info = _reset(env, record)
+    observation, info = _reset(env, record)
     yield ReplayStep(
         decision=0,
         time_s=0.0,
         control=None,
+        observation=observation,
         view=env.view,
         events=(),
         reward=0.0,
@@ -116,12 +148,13 @@ def replay(
         over=False,
     )
     for decision, control in enumerate(controls, start=1):
-        _, reward, terminated, truncated, info = env.step(control)
+        observation, reward, terminated, truncated, info = env.step(control)
         over = terminated or truncated
         yield ReplayStep(
             decision=decision,
             time_s=round(int(env.view.state.tick) * TICK_S, 6),
             control=control,
+            observation=observation,
             view=env.view,
             events=info["events"],
             reward=float(reward),

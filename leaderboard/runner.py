@@ -6,12 +6,10 @@ Whatever stops the run, Ctrl-C included, what was finished by then is on disk an
 from __future__ import annotations
 
 import dataclasses
-import platform
 import signal
 import threading
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -25,10 +23,8 @@ from leaderboard.engines import Engine, PoolEngine, SerialEngine
 from leaderboard.jobs import Job, RunSpec, plan_jobs
 from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.results import add_route, start_run
+from leaderboard.versions import package_versions
 from leaderboard.warm_up import Scene, warm_up
-
-# Packages whose version can change a bit of a result
-PACKAGES = ("driveinsight", "numpy", "numba", "llvmlite", "gymnasium", "highway-env", "torch")
 
 
 def evaluate(
@@ -136,17 +132,6 @@ def with_route(run: RunRecord, record: RouteRecord) -> RunRecord:
     """The run with one more record, in the order of the jobs whatever finished first."""
     routes = sorted((*run.routes, record), key=lambda record: record.index)
     return dataclasses.replace(run, routes=tuple(routes))
-
-
-def package_versions() -> Mapping[str, str]:
-    """The versions of Python and of those packages that are installed."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 @contextmanager

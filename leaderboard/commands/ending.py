@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 EXIT_CRASHED = 1
+EXIT_REFUTED = 1  # a claim does not stand
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
