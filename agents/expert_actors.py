@@ -29,8 +29,8 @@ PULL_OUT_M = 4.5  # behind a leader, that a change to the next lane takes from s
 PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
 FAR_M = 1e6
 
-_ABSENT, _WALKER, _PROP = (
-    int(kind) for kind in (ActorKind.ABSENT, ActorKind.WALKER, ActorKind.PROP)
+_ABSENT, _WALKER, _PROP, _DEBRIS = (
+    int(kind) for kind in (ActorKind.ABSENT, ActorKind.WALKER, ActorKind.PROP, ActorKind.DEBRIS)
 )
 
 
@@ -87,7 +87,7 @@ def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, sh
         if beside < actors.half_width[ego] + 0.2:
             _note_gap(sight, actors, ego, rear, front, along, progress, numbers)
     reach = actors.half_width[ego] + width
-    if actors.kind[actor] != _PROP:  # poles stand close to where one drives, and stay there
+    if actors.kind[actor] < _PROP:  # poles stand close to where one drives, and stay there
         reach += numbers.side_margin_m
     if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
         return
@@ -175,7 +175,7 @@ def look(sight, path, progress, actors, ways, ego, shift, span, junction, times,
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
     for actor in range(actors.kind.size):
         kind = actors.kind[actor]
-        if actor == ego or kind == _ABSENT:
+        if actor == ego or kind in (_ABSENT, _DEBRIS):
             continue
         dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
         if dx * dx + dy * dy > reach * reach:

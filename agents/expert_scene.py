@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import Lanes, Signals
+from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
 from di_envs.world.state import State
+
+LASTING_TICKS = 100_000  # for which a green that somebody forces is taken to last
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
@@ -68,5 +71,14 @@ def ways_of(lanes: Lanes) -> Ways:
 
 
 def lights_of(state: State, signals: Signals) -> Lights:
-    """The lights of a state; views, not copies."""
-    return Lights(state.light, signals.junction, state.phase_ticks)
+    """The lights of a state; views, not copies, unless a scenario plays with some of them.
+
+    Their turns then stand still: a forced yellow says when it ends, green is taken to last.
+    """
+    ticks = state.phase_ticks
+    held = state.held_by > 0
+    if held.any():
+        left = state.held_until - state.tick
+        until_red = np.where(left > 0, left, LASTING_TICKS)
+        ticks = np.where(held, GREEN_TICKS + YELLOW_TICKS - until_red, ticks).astype(np.int32)
+    return Lights(state.light, signals.junction, ticks)

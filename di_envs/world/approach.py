@@ -98,7 +98,10 @@ def yellow_left_s(state, lanes, signals, approach):
     signal = signals.stop_signal[lanes.stop_line[approach]]
     if state.light[signal] != _YELLOW:
         return 0.0
-    ticks = state.phase_ticks[signals.junction[signal]]
+    junction = signals.junction[signal]
+    if state.held_by[junction] > 0:
+        return max(state.held_until[junction] - state.tick[()], 0) * TICK_S
+    ticks = state.phase_ticks[junction]
     return (GREEN_TICKS + YELLOW_TICKS - ticks) * TICK_S
 
 

@@ -41,11 +41,14 @@ def ticks_to_green(signals, signal, phase_group, phase_ticks):
 
 @kernel
 def _lights_hold(state, walk, signals, crosswalk, needed_ticks):
-    """Whether every light of the crossed arm is red, and stays so for long enough."""
+    """Whether every light of the crossed arm is red, and stays so for long enough.
+
+    Nobody knows how long a light that is forced stays as it is.
+    """
     for k in range(walk.light_start[crosswalk], walk.light_start[crosswalk + 1]):
         signal = walk.light[k]
         junction = signals.junction[signal]
-        if state.light[signal] != RED:
+        if state.light[signal] != RED or state.forced_light[signal] != 0:
             return False
         left = ticks_to_green(
             signals, signal, state.phase_group[junction], state.phase_ticks[junction]
@@ -126,13 +129,13 @@ def may_cross(state, walk, signals, crosswalk, needed_ticks, vehicle_end):
 
 
 @kernel
-def _is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m):
-    """Whether a step from (x, y) would go into a vehicle or the second of way ahead of it.
+def is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m, look_s):
+    """Whether a step from (x, y) would go into a vehicle, or where it will be within `look_s`.
 
     Steps away from its middle are always free, so that nobody is held by a body beside them.
     """
     dx, dy = state.x[actor] - x, state.y[actor] - y
-    half_length, look = state.half_length[actor], LOOK_S * state.speed[actor]
+    half_length, look = state.half_length[actor], look_s * state.speed[actor]
     reach = half_length + look + 2.0
     if abs(dx) > reach or abs(dy) > reach or abs(state.z[actor] - z) >= SAME_LEVEL_M:
         return False
@@ -151,8 +154,8 @@ def _is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m):
 def is_blocked(state, actors, x, y, z, heading, step_m, margin_m):
     """Whether one of the first `actors` stands in, or drives into, a walker's next step."""
     for actor in range(actors):
-        if is_vehicle(state.kind[actor]) and _is_in_the_way(
-            state, actor, x, y, z, heading, step_m, margin_m
+        if is_vehicle(state.kind[actor]) and is_in_the_way(
+            state, actor, x, y, z, heading, step_m, margin_m, LOOK_S
         ):
             return True
     return False

@@ -92,20 +92,20 @@ def longitudinal_acceleration(speed_mps, throttle, brake, model):
 
 @kernel
 def move_ego(state, ego, model):
-    """Advances one ego by a tick under its held controls.
+    """Advances one ego by a tick under its held controls, plus the noise of a loss of control.
 
     `state.tick` is the tick that the motion ends at: the caller counts up first, so that
     `speed_history[tick % HISTORY_LENGTH]` is always the present speed. The position is that of the
     box centre. `locate_ego` must follow, once contacts are resolved.
     """
     speed = state.speed[ego]
-    throttle = min(max(state.throttle[ego], 0.0), 1.0)
+    throttle = min(max(state.throttle[ego] + state.throttle_noise[ego], 0.0), 1.0)
     brake = min(max(state.brake[ego], 0.0), 1.0)
     acceleration = longitudinal_acceleration(speed, throttle, brake, model)
     next_speed = max(speed + acceleration * TICK_S, 0.0)
     mean_speed = 0.5 * (speed + next_speed)
 
-    steer = min(max(state.steer[ego], -1.0), 1.0)
+    steer = min(max(state.steer[ego] + state.steer_noise[ego], -1.0), 1.0)
     state.wheel[ego] += (steer - state.wheel[ego]) * (1.0 - math.exp(-TICK_S / model.steer_lag_s))
     wheelbase = model.front_axle_m + model.rear_axle_m
     slope = model.rear_axle_m / wheelbase * math.tan(model.steer_gain_rad * state.wheel[ego])

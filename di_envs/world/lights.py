@@ -1,6 +1,8 @@
 # mypy: disallow_untyped_defs=False
 """Traffic lights: the arms of a junction take turns, one group at a time, the rest stay red.
 
+While a scenario plays with a junction's lights its turns stand still; then they go on.
+
 Source: CARLA's rule as its maintainers describe it (carla issues 7684 and 7738), with the times of
 the example there: green 10 s, yellow 3 s, red 2 s.
 """
@@ -40,7 +42,7 @@ def start_lights(state, signals):
 def advance_lights(state, signals):
     """One tick: turns end, the next group's begins, every head shows its colour."""
     for junction in range(signals.groups.size):
-        if signals.groups[junction] > 0:
+        if signals.groups[junction] > 0 and state.held_by[junction] == 0:
             state.phase_ticks[junction] += 1
             if state.phase_ticks[junction] >= TURN_TICKS:
                 state.phase_ticks[junction] = 0
@@ -51,10 +53,13 @@ def advance_lights(state, signals):
 
 @kernel
 def show_lights(state, signals):
-    """Sets each head's colour from its junction's phase."""
+    """Sets each head's colour from its junction's phase, or as it is forced to."""
     for signal in range(signals.kind.size):
         if signals.kind[signal] != _LIGHT:
             state.light[signal] = _NONE
+            continue
+        if state.forced_light[signal] != _NONE:
+            state.light[signal] = state.forced_light[signal]
             continue
         junction = signals.junction[signal]
         ticks = state.phase_ticks[junction]
@@ -66,3 +71,29 @@ def show_lights(state, signals):
             state.light[signal] = _YELLOW
         else:
             state.light[signal] = _GREEN
+
+
+@kernel
+def hold_lights(state, signals, junction, holder):
+    """Takes a junction's lights out of their turns: all red until `force_light` says otherwise.
+
+    Args:
+        state: The world.
+        signals: The town's signals.
+        junction: The junction.
+        holder: 1 + the trigger that plays with them.
+    """
+    state.held_by[junction] = holder
+    for signal in range(signals.kind.size):
+        if signals.junction[signal] == junction and signals.kind[signal] == _LIGHT:
+            state.forced_light[signal] = _RED
+
+
+@kernel
+def release_lights(state, signals, junction):
+    """Gives a junction's lights back to their turns, which go on where they stood."""
+    state.held_by[junction] = 0
+    for signal in range(signals.kind.size):
+        if signals.junction[signal] == junction:
+            state.forced_light[signal] = _NONE
+    show_lights(state, signals)

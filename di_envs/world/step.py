@@ -20,6 +20,8 @@ from di_envs.world.lights import advance_lights
 from di_envs.world.occupancy import Occupancy, fill_occupancy
 from di_envs.world.progress import advance_progress
 from di_envs.world.right_of_way import update_grants
+from di_envs.world.scenario_tables import ScenarioTables
+from di_envs.world.scenarios import move_scenarios, occupy_crossings, watch_scenarios
 from di_envs.world.state import ActorKind, Routes
 from di_envs.world.traffic import Leaders, choose_speed, find_leaders
 from di_envs.world.traffic_tables import TrafficTables
@@ -40,6 +42,7 @@ class Scenery(NamedTuple):
     tables: TrafficTables
     walk: WalkGraph
     routes: Routes
+    scenarios: ScenarioTables
     ego_model: EgoParameters
 
 
@@ -53,6 +56,7 @@ class Scratch(NamedTuple):
     busy: NDArray[np.int8]  # (X,) crosswalks that somebody walks on
     acceleration: NDArray[np.float64]  # (A,)
     cap: NDArray[np.float64]  # (A,)
+    below: NDArray[np.int32]  # (OCCUPIED_LANES,)
 
 
 @kernel
@@ -77,6 +81,7 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
         advance_lights(state, scenery.signals)
         _move_traffic(state, scenery, scratch, egos, vehicle_end)
         move_walkers(state, scenery.walk, scenery.signals, vehicle_end)
+        move_scenarios(state, scenery.scenarios, scenery.signals, vehicle_end)
         for ego in range(egos):
             if state.kind[ego] != _ABSENT:
                 move_ego(state, ego, scenery.ego_model)
@@ -86,6 +91,10 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
                 locate_ego(state, scenery.lanes, ego)
                 note_ego_arrival(state, scenery.lanes, ego)
                 advance_progress(state, scenery.routes, ego)
+            n = watch_scenarios(
+                state, scenery.scenarios, scenery.signals, scenery.routes, ego, out, n
+            )
+            if state.kind[ego] != _ABSENT:
                 n = detect_events(
                     state,
                     scenery.lanes,
@@ -106,6 +115,7 @@ def _move_traffic(state, scenery, scratch, egos, vehicle_end):
     occupancy, requests, leaders = scratch.occupancy, scratch.requests, scratch.leaders
     mark_busy_crosswalks(state, scenery.walk, scratch.busy)
     fill_occupancy(occupancy, state, lanes, egos, vehicle_end)
+    occupy_crossings(occupancy, state, scenery.scenarios, lanes, scratch.below)
     change_lanes(occupancy, state, lanes, tables, egos, vehicle_end)
     find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end)
     update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end, leaders)

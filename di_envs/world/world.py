@@ -20,8 +20,10 @@ from di_envs.world.events import begin_events
 from di_envs.world.lights import start_lights
 from di_envs.world.occupancy import make_occupancy
 from di_envs.world.poles import place_poles
+from di_envs.world.scenario_tables import actors_needed, scenario_tables
 from di_envs.world.spawn import spawn_traffic
 from di_envs.world.state import (
+    OCCUPIED_LANES,
     ActorKind,
     Capacity,
     EventKind,
@@ -208,7 +210,7 @@ class World:
                 f"the snapshot was saved in a town with hash {snapshot.town_hash}, this one has "
                 f"{self.town.content_hash}; load the town that it was saved in"
             )
-        capacity = self._capacity(len(snapshot.plans))
+        capacity = self._capacity(snapshot.plans)
         if (snapshot.version, snapshot.capacity) != (STATE_VERSION, capacity):
             raise ValueError(
                 f"the snapshot has layout {snapshot.version} {snapshot.capacity}, this world has "
@@ -217,19 +219,21 @@ class World:
         self._allocate(snapshot.plans)
         self._record.view(np.uint8)[...] = snapshot.record.view(np.uint8)
 
-    def _capacity(self, egos: int) -> Capacity:
+    def _capacity(self, plans: tuple[RoutePlan, ...]) -> Capacity:
         return Capacity(
-            egos=egos,
+            egos=len(plans),
             vehicles=self.config.vehicles,
             walkers=self.config.walkers,
             props=self.town.signals.kind.size,
             junctions=self.town.signals.groups.size,
             signals=self.town.signals.kind.size,
+            triggers=sum(len(plan.scenarios) for plan in plans),
+            scenario_actors=actors_needed(plans),
         )
 
     def _allocate(self, plans: tuple[RoutePlan, ...]) -> None:
         """Makes a fresh record and the kernels' arguments for these plans."""
-        capacity = self._capacity(len(plans))
+        capacity = self._capacity(plans)
         actors = capacity.actors
         self._record = np.zeros(1, state_dtype(capacity))
         self._state = views_of(self._record)
@@ -241,6 +245,7 @@ class World:
             tables=self._tables,
             walk=self._walk,
             routes=route_arrays(plans),
+            scenarios=scenario_tables(self.town, plans, capacity.first_scenario_actor),
             ego_model=self._ego_model,
         )
         self._scratch = Scratch(
@@ -250,6 +255,7 @@ class World:
             busy=np.zeros(self.town.crosswalks.width_m.size, np.int8),
             acceleration=np.zeros(actors),
             cap=np.zeros(actors),
+            below=np.full(OCCUPIED_LANES, -1, np.int32),
         )
         self._batch = 100
         self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * self._batch, COLUMNS))
