@@ -15,8 +15,10 @@ from di_envs.world.world import Event, WorldView
 
 
 def drive(agent_name: str, route: int, look: Callable[[WorldView], None]) -> list[Event]:
-    """Drives a route of town05_long to its end and returns its events."""
-    env: Any = gymnasium.make("DriveInsight-Town05Long-v0", observations=("prompt",)).unwrapped
+    """Drives a route of town05_long, without scenarios, to its end and returns its events."""
+    env: Any = gymnasium.make(
+        "DriveInsight-Town05Long-v0", observations=("prompt",), scenarios="none"
+    ).unwrapped
     agent = load_agent(agent_name)
     observation, _ = env.reset(seed=route, options={"route": route})
     memory = agent.start(env.plan, route)
