@@ -28,7 +28,7 @@ from di_envs.world.state import OCCUPIED_LANES, TICK_S, ActorKind
 from di_envs.world.walkers import HEIGHT_M, LIE_TICKS
 
 WAITING, CROSSING = 1, 2
-HIDDEN = 3  # type: somebody behind a vending machine
+HIDDEN = 3  # the type with somebody behind a vending machine
 CYCLIST_SHARE = 0.25  # of those who step out from behind something; CARLA has none
 CYCLIST_HALF_LENGTH_M, CYCLIST_HALF_WIDTH_M, CYCLIST_HEIGHT_M = 0.9, 0.3, 1.7
 LOOK_S = 1.5  # of other vehicles' ways that he does not step into …
