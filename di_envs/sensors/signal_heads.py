@@ -1,7 +1,8 @@
 """Traffic lights and stop signs as boxes: posts, housings, and where each lamp hangs.
 
-Each light shows twice: on its own pole beside the stop line, and over the far side of the junction,
-where it is seen from the stop line as in North America.
+Each light shows twice: on its own pole beside the stop line, and over the junction's far side,
+where it is seen from the stop line as in North America. Where nothing leads straight on, as from
+the stem of a T, the far one stands across the street that the stem ends in.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ LAMP_SPACING_M = 0.42
 _HOUSING = (0.035, 0.04, 0.035)
 _STEEL = (0.3, 0.31, 0.33)
 _FAR_LIMIT_M = 18.0  # how far from its lane a far pole may stand
+_ACROSS_LIMIT_M = 60.0  # how far from the stop line of a stem the other side of the street may be
 
 
 @by_reference
@@ -111,25 +113,21 @@ def _far_sides(
 ) -> Iterator[tuple[list[BoxSpec], tuple[float, float, float, float]]]:
     """A pole with an arm beyond the junction, and the head that hangs from it."""
     lanes, signals = town.lanes, town.signals
+    stops = np.flatnonzero(signals.stop_signal == signal).tolist()
     ahead = []
-    for stop in np.flatnonzero(signals.stop_signal == signal).tolist():
+    for stop in stops:
         lane = int(signals.stop_lane[stop])
         ways = lanes.successor[lanes.successor_start[lane] : lanes.successor_start[lane + 1]]
         ahead += [int(way) for way in ways if lanes.turn[way] == Turn.STRAIGHT]
     if not ahead:
+        if stops:
+            yield _across(signals.stop_pose[stops[-1]].tolist(), classes, origin)
         return
     way = ahead[-1]
     x, y, z, yaw = lanes.points[lanes.first[way] + lanes.count[way] - 1].tolist()
     right_x, right_y = -math.sin(yaw), math.cos(yaw)
     x, y = x + math.cos(yaw) * 1.0, y + math.sin(yaw) * 1.0
-    out = 0.0
-    while out < _FAR_LIMIT_M:
-        column = int((x + right_x * out - origin[0]) / TEXEL_M)
-        row = int((y + right_y * out - origin[1]) / TEXEL_M)
-        if classes[row, column] not in (ASPHALT, SHOULDER):
-            break
-        out += TEXEL_M
-    out += 0.45  # on the kerb
+    out = _to_kerb(x, y, right_x, right_y, _FAR_LIMIT_M, classes, origin) + 0.45
     px, py = x + right_x * out, y + right_y * out
     reach = max(out - 0.3, 0.6)  # over the lane's middle
     pole = BoxSpec(
@@ -151,3 +149,39 @@ def _far_sides(
             yaw,
         ),
     )
+
+
+def _across(
+    stop: list[float], classes: NDArray[np.uint8], origin: NDArray[np.float64]
+) -> tuple[list[BoxSpec], tuple[float, float, float, float]]:
+    """A pole straight ahead of a stop line, beyond the street there, and the head before it."""
+    x, y, z, yaw = stop
+    c, s = math.cos(yaw), math.sin(yaw)
+    begin = 1.0  # past the line itself
+    away = begin + _to_kerb(x + begin * c, y + begin * s, c, s, _ACROSS_LIMIT_M, classes, origin)
+    px, py = x + c * (away + 0.45), y + s * (away + 0.45)
+    high = (FAR_HEAD_M + 0.75) / 2.0
+    pole = BoxSpec(
+        centre=(px, py, z + high), half=(0.11, 0.11, high), yaw=yaw, colour=_STEEL, tag=Tag.POLES
+    )
+    return [pole], (px - c * 0.3, py - s * 0.3, z + FAR_HEAD_M, yaw)
+
+
+def _to_kerb(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    limit_m: float,
+    classes: NDArray[np.uint8],
+    origin: NDArray[np.float64],
+) -> float:
+    """How far the road goes on from a place in a direction (c, s), at most `limit_m` [m]."""
+    out = 0.0
+    while out < limit_m:
+        column = int((x + c * out - origin[0]) / TEXEL_M)
+        row = int((y + s * out - origin[1]) / TEXEL_M)
+        if classes[row, column] not in (ASPHALT, SHOULDER):
+            break
+        out += TEXEL_M
+    return out

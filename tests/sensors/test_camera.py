@@ -6,6 +6,7 @@ import hashlib
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -17,7 +18,7 @@ from di_envs.sensors.camera_config import RIGS, CameraConfig, Rig, rig_of
 from di_envs.sensors.scene import scene_of
 from di_envs.sensors.tags import Tag
 from di_envs.sensors.weather import PRESETS, weather_of
-from di_envs.town.lanes import LaneKind, LightState
+from di_envs.town.lanes import LaneKind, LightState, SignalKind
 from di_envs.town.loading import load_town
 from di_envs.world.state import ActorKind, views_of
 from di_envs.world.world import World, WorldConfig
@@ -152,36 +153,89 @@ def test_lane_lines_are_seen_within_a_pixel_of_where_the_lane_network_has_them(t
         assert found == pytest.approx(at_row, abs=1.0)
 
 
-@pytest.mark.parametrize("rig", ["paper", "small"])
-@pytest.mark.parametrize("state", [LightState.RED, LightState.YELLOW, LightState.GREEN])
-def test_a_lamp_can_be_read_20_m_before_the_stop_line_and_at_it(town, empty, rig, state):
-    """The same picture but for the light: at the lamp its dominant channels change by over 60."""
-    dominant = {LightState.RED: [0], LightState.YELLOW: [0, 1], LightState.GREEN: [1]}[state]
-    for metres in (20.0, 4.0):
-        place(empty, 0, *before_stop_line(town, metres))
+LIGHTS = (LightState.RED, LightState.YELLOW, LightState.GREEN)
+
+
+def lit(town, empty, rig, weather, metres, every=1):
+    """Each light alone, seen from each of its lanes: stop line, then the three pictures by state.
+
+    `metres` from the ego's bumper to the stop line; every so many stop lines.
+    """
+    signals, record = town.signals, empty.save().record
+    state = views_of(record)
+    cameras = CameraRig(town, rig, PRESETS[weather])
+    cameras.start(SimpleNamespace(state=state))  # a state of its own, to write into
+    stops = np.flatnonzero(signals.kind[signals.stop_signal] == SignalKind.LIGHT)[::every]
+    for stop in stops.tolist():
+        x, y, z, yaw = signals.stop_pose[stop]
+        back = metres + float(state.half_length[0])
+        state.x[0], state.y[0] = x - back * math.cos(yaw), y - back * math.sin(yaw)
+        state.z[0], state.yaw[0] = z, yaw
         pictures = {}
-        for shown in (LightState.NONE, state):
-            snapshot = empty.save()
-            views_of(snapshot.record).light[:] = shown
-            empty.restore(snapshot)
-            pictures[shown] = images(empty, rig)["camera_front"].astype(int)
-        change = (pictures[state] - pictures[LightState.NONE])[..., dominant]
-        assert (change.min(axis=2) > 60).sum() >= 2  # two pixels and more
+        for shown in (LightState.NONE, *LIGHTS):
+            state.light[:] = LightState.NONE
+            state.light[signals.stop_signal[stop]] = shown
+            pictures[shown] = cameras.observe()["camera_front"].astype(int)
+        yield stop, pictures
 
 
-def test_the_three_lights_differ_from_each_other(town, empty):
-    place(empty, 0, *before_stop_line(town, 20.0))
-    seen = {}
-    for shown in (LightState.RED, LightState.YELLOW, LightState.GREEN):
-        snapshot = empty.save()
-        views_of(snapshot.record).light[:] = shown
-        empty.restore(snapshot)
-        seen[shown] = images(empty, "paper")["camera_front"].astype(int)
-    red, yellow, green = seen.values()
-    assert (red - green)[..., 0].max() > 60
-    assert (green - red)[..., 1].max() > 60
-    assert (yellow - red)[..., 1].max() > 60
-    assert (yellow - green)[..., 0].max() > 60
+def lamps_differ(pictures):
+    """By how many grey levels, in the channels that tell the three lights from each other."""
+    red, yellow, green = (pictures[light] for light in LIGHTS)
+    return min(
+        (red - green)[..., 0].max(),
+        (green - red)[..., 1].max(),
+        (yellow - red)[..., 1].max(),
+        (yellow - green)[..., 0].max(),
+    )
+
+
+LIT = {  # the colour of a lamp that shines
+    LightState.RED: (255, 15, 13),
+    LightState.YELLOW: (255, 199, 13),
+    LightState.GREEN: (25, 255, 76),
+}
+
+
+def bloom_px(pictures, light):
+    """Width of a disc that covers as many pixels with a lamp's colour as the lamp has covered."""
+    behind = pictures[LightState.NONE]
+    towards = np.array(LIT[light]) - behind
+    cover = ((pictures[light] - behind) * towards).sum(axis=2) / (towards**2).sum(axis=2)
+    row, column = np.unravel_index(cover.argmax(), cover.shape)
+    near = cover[max(0, row - 2) : row + 3, max(0, column - 2) : column + 3]
+    return 2.0 * math.sqrt(near.clip(0.0).sum() / math.pi)
+
+
+@pytest.mark.parametrize(
+    ("metres", "weather"),
+    [
+        (0.0, "ClearNoon"),
+        (0.0, "HardRainNoon"),
+        (0.0, "ClearNight"),
+        (0.0, "HardRainNight"),
+        (20.0, "ClearNoon"),
+        (20.0, "HardRainNight"),
+    ],
+)
+def test_small_cameras_read_every_light_of_the_town_from_its_stop_line(
+    town, empty, weather, metres
+):
+    """With the bumper at the line and 20 m before it, a lamp is less than a pixel wide."""
+    rig = Rig(cameras=RIGS["small"].cameras[:1])
+    seen = 0
+    for stop, pictures in lit(town, empty, rig, weather, metres):
+        assert lamps_differ(pictures) > 60, stop
+        assert min(bloom_px(pictures, light) for light in LIGHTS) >= 1.5, stop
+        seen += 1
+    assert seen > 100
+
+
+@pytest.mark.parametrize("weather", ["ClearNoon", "HardRainNight"])
+def test_the_papers_cameras_read_lights_20_m_before_the_stop_line(town, empty, weather):
+    rig = Rig(cameras=RIGS["paper"].cameras[:1])
+    for stop, pictures in lit(town, empty, rig, weather, 20.0, every=29):
+        assert lamps_differ(pictures) > 60, stop
 
 
 def test_a_lamp_is_not_seen_from_behind(town, empty):
