@@ -91,8 +91,11 @@ def _row(studio, canvas, y, boxes):
     x, width = 0, depth.shape[0]
     while x < width:
         code = canvas.code[x]
-        # before the first column that a box may cover all is one code, and after the last one
-        end = run_end(canvas.code, max(x, low - 1), high) if x < high else width
+        end = width
+        if x < high:  # boxes cover columns of [low, high) at most
+            end = run_end(canvas.code, max(x, low - 1), high)
+            if end == high and code < 0:
+                end = width
         if code < 0:
             if with_who:
                 fill(who[x:end], np.int32(0))

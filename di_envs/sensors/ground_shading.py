@@ -146,8 +146,11 @@ def shade_row(studio, canvas, v, far):
                 if at < row[4 * strip + 2] or at > row[4 * strip + 3]:
                     end = -1e9
                 continue
-            a, b = (row[4 * strip + 2] - at) / step, (row[4 * strip + 3] - at) / step
+            over = 1.0 / step
+            a, b = (row[4 * strip + 2] - at) * over, (row[4 * strip + 3] - at) * over
             start, end = max(start, min(a, b)), min(end, max(a, b))
+            if end <= start:
+                break
         if end > start:
             first = max(0, math.floor(start))
             stop = min(width, math.ceil(end) + 1)

@@ -17,6 +17,8 @@ from di_envs.sensors.scene import ROOM
 NEAR = 0.1  # m; nothing nearer is seen
 SMALLEST_PX = 0.7  # boxes that look smaller are left out, unless they shine
 SHADOW_RANGE_M = 90.0
+_GROWN_PX = 0.02  # a ray is traced in single precision: it may meet a box by a hair beside it
+_LAMP_GROWN_PX = 1.0  # a lamp blooms where it covers no pixel's middle
 _LAMP = int(Material.LAMP)
 
 # Columns of a camera's numbers: where it is, its axes ahead, right and down, and its intrinsics
@@ -98,10 +100,11 @@ def project_boxes(cam, boxes, look, width, height, out):
                     dot += axes[side, q] * cam[at + q]
                 in_cam[1 + side, k] = dot * boxes.half[b, side]
         v = out.count[0]
-        if _bounds(in_cam, cam, width, height, out.rect[v]):
+        grown = _LAMP_GROWN_PX if boxes.material[b] == _LAMP else _GROWN_PX
+        if _bounds(in_cam, cam, width, height, grown, out.rect[v]):
             out.source[v] = b
             _rays(rel, axes, cam, out.ray[v])
-            _light(boxes, b, axes, look, out.faces[6 * v : 6 * v + 6])
+            _light(boxes, b, axes, look, out.ray[v], out.faces[6 * v : 6 * v + 6])
             out.count[0] = v + 1
 
 
@@ -119,8 +122,17 @@ def _axes_of(boxes, b, axes):
 
 
 @kernel
-def _bounds(box, cam, width, height, rect):
-    """Writes the pixels that a box may cover, cut at the near plane; False if there are none."""
+def _bounds(box, cam, width, height, grown, rect):
+    """Writes the pixels whose middles a box may cover; False if there are none.
+
+    Args:
+        box: (4, 3) its middle and half sides, ahead, right and down of the camera; what is nearer
+            than the near plane is cut off.
+        cam: (16,) the camera's numbers.
+        width, height: Of the image.
+        grown: Pixels by which the box counts as larger on each side.
+        rect: (4,) written.
+    """
     focal, cx, cy = cam[12], cam[13], cam[14]
     low_x, high_x, low_y, high_y = 1e9, -1e9, 1e9, -1e9
     for corner in range(8):
@@ -144,10 +156,10 @@ def _bounds(box, cam, width, height, rect):
                     low_y, high_y = min(low_y, y2), max(high_y, y2)
     if high_x < low_x:
         return False
-    rect[0] = int(min(max(cx + focal * low_x - 1.0, 0.0), width * 1.0))
-    rect[1] = int(min(max(cx + focal * high_x + 2.0, 0.0), width * 1.0))
-    rect[2] = int(min(max(cy + focal * low_y - 1.0, 0.0), height * 1.0))
-    rect[3] = int(min(max(cy + focal * high_y + 2.0, 0.0), height * 1.0))
+    rect[0] = math.ceil(min(max(cx + focal * low_x - 0.5 - grown, 0.0), width * 1.0))
+    rect[1] = math.floor(min(max(cx + focal * high_x + 0.5 + grown, 0.0), width * 1.0))
+    rect[2] = math.ceil(min(max(cy + focal * low_y - 0.5 - grown, 0.0), height * 1.0))
+    rect[3] = math.floor(min(max(cy + focal * high_y + 0.5 + grown, 0.0), height * 1.0))
     return rect[1] > rect[0] and rect[3] > rect[2]
 
 
@@ -170,12 +182,14 @@ def _rays(rel, axes, cam, ray):
 
 
 @kernel
-def _light(boxes, b, axes, look, faces):
-    """Writes the colours of a box's six faces: +x, -x, +y, -y, +z, -z."""
+def _light(boxes, b, axes, look, ray, faces):
+    """Writes the colours of a box's faces that the camera may see: +x, -x, +y, -y, +z, -z."""
     shines = boxes.material[b] == _LAMP
     for face in range(6):
         sign = 1.0 if face % 2 == 0 else -1.0
         axis = face // 2
+        if sign * ray[axis] < 0.0:
+            continue  # the camera is on the other side
         toward = 0.0
         for q in range(3):
             toward += sign * axes[axis, q] * look.sun[q]
