@@ -13,10 +13,12 @@ from typing import Annotated, Any
 
 import tyro
 
+from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.lists import Agents, Suites
+from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
 from leaderboard.commands.verify import VERIFY_HELP, Verify
 
@@ -35,6 +37,8 @@ Command = (
     | Annotated[Drive, tyro.conf.subcommand("drive", description=DRIVE_HELP)]
     | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_HELP)]
     | Annotated[Verify, tyro.conf.subcommand("verify", description=VERIFY_HELP)]
+    | Annotated[ScoreByRules, tyro.conf.subcommand("score", description=SCORE_HELP)]
+    | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
 )

@@ -78,11 +78,12 @@ def route_files(folder: Path) -> list[Path]:
 
 
 def write_run(folder: Path, run: RunRecord) -> None:
-    """Writes a run with all its routes.
+    """Writes a run with all its routes, into a folder that is made if need be.
 
     Raises:
         ResultsError: If the folder cannot be written to.
     """
+    _write(folder, lambda: folder.mkdir(parents=True, exist_ok=True))
     start_run(folder, run)
     for record in run.routes:
         _write(folder, partial(_write_route, folder, run, record))

@@ -10,11 +10,12 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis.strategies import floats, sampled_from
+from made_records import event, route, run_of
 from rich.console import Console
 
 from di_envs.world.state import EventKind
 from leaderboard.carla_results import carla_results
-from leaderboard.record import LOST, Bound, EventRecord, RouteRecord, RunRecord
+from leaderboard.record import LOST, RouteRecord, RunRecord
 from leaderboard.report import driving_interval, run_tables
 from leaderboard.results import (
     CARLA_FILE,
@@ -44,51 +45,6 @@ LABELS = [
     "Route timeouts",
     "Agent blocked",
 ]
-
-
-def event(kind: EventKind, **fields: object) -> EventRecord:
-    values = {"tick": 40, "time_s": 2.0, "x": 1.23456, "y": -2.0, "z": 0.0, **fields}
-    return EventRecord(kind=kind, **values)  # type: ignore[arg-type]
-
-
-def route(route_id: str = "7", seed: int = 0, index: int = 0, **fields: object) -> RouteRecord:
-    values = {
-        "status": "Completed",
-        "score": Score(route_completion=100.0, infraction_score=1.0),
-        "length_m": 1000.0,
-        "keypoints_m": 1000.0,
-        "done_m": 1000.0,
-        "travelled_m": 1000.0,
-        "game_s": 200.0,
-        "steps": 2000,
-        "wall_s": 1.5,
-        "bound": Bound(route_completion=100.0, finish_s=150.0, stopped_s=20.0),
-        "route_hash": "aa",
-        "observation_hash": "bb",
-        "reward_hash": "cc",
-        "event_hash": "dd",
-        **fields,
-    }
-    return RouteRecord(route_id=route_id, seed=seed, index=index, world_seed=99, **values)  # type: ignore[arg-type]
-
-
-def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -> RunRecord:
-    values = {
-        "rules": "carla-1.0",
-        "agent": "expert",
-        "track": "PRIVILEGED",
-        "requires": {"observations": ["prompt"]},
-        "suite": "town05_long",
-        "suite_version": 1,
-        "options": {"traffic": 3},
-        "town": "town05",
-        "town_hash": "ff",
-        "seeds": (0, 1),
-        "versions": {"python": "3.11"},
-        "cpu": "generic",
-        **fields,
-    }
-    return RunRecord(planned=planned or len(routes), routes=routes, **values)  # type: ignore[arg-type]
 
 
 RED = route(

@@ -1,0 +1,55 @@
+"""`driveinsight compare`: pairs two runs by route and seed; says what changed, how surely, why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.scene_arguments import says
+
+COMPARE_HELP = """Pair two runs by route and seed: what changed in the second, how surely, and why.
+
+Examples:
+  driveinsight compare results/mine results/mine-2
+  driveinsight compare results/expert-town05_long results/highway-town05_long --rules carla-2.1
+
+Only runs of the same worlds are paired: same suite, town, traffic, package versions and CPU. Routes
+that the machinery lost are left out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare:
+    """The arguments of `driveinsight compare`."""
+
+    first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FIRST")]
+    """A run's output folder."""
+
+    second: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SECOND")]
+    """Another's."""
+
+    rules: Annotated[str | None, says("NAME", "their own")] = None
+    """Score both by these rules first."""
+
+    def run(self) -> int:
+        """Compares; returns the exit code."""
+        from leaderboard.comparing import PairingError, compare_runs
+        from leaderboard.comparison_table import comparison_tables
+        from leaderboard.rescoring import rescored
+        from leaderboard.results import ResultsError, read_run
+        from leaderboard.rules import rules_named
+
+        try:
+            runs = [read_run(path) for path in (self.first, self.second)]
+            if self.rules is not None:
+                runs = [rescored(run, rules_named(self.rules)) for run in runs]
+            comparison = compare_runs(*runs)
+        except (ResultsError, PairingError, ValueError) as error:
+            raise UsageError(str(error)) from error
+        Console().print(comparison_tables(comparison))
+        say(f"Next: driveinsight verify {self.second}")
+        return 0
