@@ -13,6 +13,10 @@ from di_envs.sensors.lidar_config import SWEEP_S, LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
 
 OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar")
+# In place of a tuple of groups: the name of a preset, which chooses groups and the rig.
+OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
+    "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}
+}
 EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
 RULES = ("carla-1.0", "carla-2.0", "carla-2.1")
 
@@ -74,6 +78,7 @@ class RouteEnvConfig:
             them, several with commas between, or `none`.
         observations: Groups of observations: `camera`, `lidar`, `prompt`, `inertial`. Each camera
             costs its time, so name what is needed: `("prompt",)` alone steps many times faster.
+            Or the name of a preset: `rl` is the prompt and the rig `rl`, one camera of 84 x 84.
         traffic: Number of other vehicles.
         walkers: Number of walkers.
         weather: Name of one of CARLA's weather presets; seen by cameras only.
@@ -104,6 +109,7 @@ class RouteEnvConfig:
     terminate_on: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        self._expand_preset()
         self._freeze_names()
         if self.suite is None and (self.town is None or self.routes is None):
             raise ValueError(
@@ -121,6 +127,23 @@ class RouteEnvConfig:
                 f"control_dt_s must be a positive multiple of the world tick of {TICK_S} s, such "
                 f"as 0.05, 0.1 or 0.5; got {self.control_dt_s!r}."
             )
+
+    def _expand_preset(self) -> None:
+        """Puts a preset's groups and rig in the place of its name."""
+        if not isinstance(self.observations, str):
+            return
+        if self.observations in OBSERVATION_GROUPS:
+            return  # refused below, with the tuple that was meant
+        check_name(self.observations, OBSERVATION_PRESETS, "preset of observations")
+        preset = OBSERVATION_PRESETS[self.observations]
+        default = type(self).cameras
+        if self.cameras not in (default, preset["cameras"]):
+            raise ValueError(
+                f"The preset {self.observations!r} chooses the rig {preset['cameras']!r}; for "
+                f"another one name its groups: observations={preset['observations']!r}."
+            )
+        for field, value in preset.items():
+            object.__setattr__(self, field, value)
 
     def _freeze_names(self) -> None:
         """Makes tuples of lists (JSON has no tuples); a lone string is refused, not spelled out."""

@@ -7,6 +7,7 @@ import pytest
 from gymnasium import spaces
 from hand_made import Scene, toy_plan, toy_town
 
+from di_envs.config import RouteEnvConfig
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
 
@@ -75,3 +76,17 @@ def test_the_speedometer_shows_what_the_prompt_does(scene):
     alone, beside = scene.observe(("inertial",)), scene.observe(("prompt", "inertial"))
     assert alone["speed"] == beside["speed"] == np.float32([7.25])
     assert alone["speed"].dtype == np.float32
+
+
+def test_the_preset_for_reinforcement_learning_is_the_prompt_and_one_small_camera():
+    preset = RouteEnvConfig(suite="toy", observations="rl")
+    assert preset == RouteEnvConfig(suite="toy", observations=("prompt", "camera"), cameras="rl")
+
+
+def test_an_unknown_preset_and_one_with_another_rig_are_refused():
+    with pytest.raises(ValueError, match="preset of observations 'rk'"):
+        RouteEnvConfig(suite="toy", observations="rk")
+    with pytest.raises(ValueError, match="chooses the rig 'rl'"):
+        RouteEnvConfig(suite="toy", observations="rl", cameras="paper")
+    with pytest.raises(ValueError, match="tuple of names"):
+        RouteEnvConfig(suite="toy", observations="prompt")
