@@ -66,6 +66,10 @@ SCHEMES: dict[str, AgentEntry] = {
         entry_point="agents.carla:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
     ),
+    "sb3": AgentEntry(
+        entry_point="agents.sb3:Sb3Agent",
+        summary="sb3:FILE.zip[?control_dt_s=0.2]: a model that Stable-Baselines3 saved",
+    ),
 }
 
 _CONTRACT = ("requires", "start", "act", "close")

@@ -17,10 +17,10 @@ from leaderboard.jobs import Job, RunSpec
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 
-def printed(name):
+def printed(name, *arguments):
     """What an example prints, run as a user would; warnings are errors there too."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", str(EXAMPLES / name)],
+        [sys.executable, "-W", "error", str(EXAMPLES / name), *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -77,3 +77,20 @@ def test_the_agent_of_the_example_is_scored_by_its_path():
         record = driver.drive(Job(index=0, route_id=driver.env.route_ids[0], seed=0))
     assert record.reason == ""
     assert record.score.route_completion > 60.0
+
+
+def test_a_model_is_trained_and_then_scored(tmp_path):
+    pytest.importorskip("stable_baselines3", reason="needs the extra rl")
+    model = tmp_path / "ppo.zip"
+    arguments = ("--model", str(model), "--steps", "1024", "--worlds", "4", "--traffic", "4")
+    text = printed("train_ppo.py", *arguments, "--rollout", "1024", "--threads", "1")
+    assert f"sb3:{model}" in text
+    assert "driving_score" in (tmp_path / "ppo.monitor.csv").read_text().splitlines()[1]
+    agent = load_agent(f"sb3:{model}")
+    assert agent.requires.control_dt_s == 0.2  # the model says so
+    assert agent.requires.track == Track.PROMPT
+    options = {"suite": "town05_tiny", "traffic": 4}
+    with Driver(RunSpec(agent=f"sb3:{model}", options=options)) as driver:
+        record = driver.drive(Job(index=0, route_id=driver.env.route_ids[0], seed=0))
+    assert record.reason == ""
+    assert record.score.route_completion > 5.0  # it is made to drive off from the start
