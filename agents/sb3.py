@@ -76,10 +76,10 @@ class Sb3Agent:
             )
         except ValueError as error:
             raise AgentSpecError(f"agent '{self._name}': {error}") from error
-        if self._form == "waypoints" and "prompt" not in self._senses.groups:
+        if self._form == "waypoints" and not {"prompt", "inertial"} & set(self._senses.groups):
             raise AgentSpecError(
                 f"agent '{self._name}' gives waypoints, and the controller that follows them needs "
-                f"the speed: train it with the observation group 'prompt'."
+                f"the speed: train it with the observation group 'prompt' or 'inertial'."
             )
         self._controller = WaypointControllerConfig()
 

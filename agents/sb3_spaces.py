@@ -36,7 +36,7 @@ class Senses:
 
 
 def senses_of(wanted: spaces.Space[Any], told: Mapping[str, Any]) -> Senses:
-    """The smallest choice of groups whose observations fit a model's space.
+    """The choice of groups whose observations fit a model's space.
 
     Args:
         wanted: The model's observation space.

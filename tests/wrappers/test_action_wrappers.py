@@ -122,7 +122,7 @@ def test_a_branch_has_the_controllers_past_errors():
 
 def test_waypoints_need_a_speed_in_metres_a_second():
     with pytest.raises(ValueError, match="group 'prompt'"):
-        WaypointWrapper(toy(observations=("inertial",)))
+        WaypointWrapper(toy(observations=("camera",), cameras="rl"))
     with pytest.raises(ValueError, match="outside of this one"):
         WaypointWrapper(VectorObservations(toy()))
 
