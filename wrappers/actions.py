@@ -65,8 +65,8 @@ class WaypointWrapper(gymnasium.ActionWrapper[Observation, Action, Action]):
         if not isinstance(speed, gymnasium.spaces.Box) or speed.high.max() != SPEED_LIMIT_MPS:
             raise ValueError(
                 "WaypointWrapper reads the ego's speed from the observation: make the environment "
-                "with the group 'prompt' or 'inertial', and put wrappers that rescale it outside of "
-                "this one."
+                "with the group 'prompt' or 'inertial', and put wrappers that rescale the speed "
+                "outside of this one."
             )
         self.action_space: Any = waypoint_space()
         self._config = config or WaypointControllerConfig()
