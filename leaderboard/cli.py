@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _plain_warnings():
             return command.run()
     except KeyboardInterrupt:
-        complain("interrupted before a route was finished: nothing was kept")
+        complain("interrupted before anything was driven")
         return EXIT_INTERRUPTED
     except UsageError as error:
         complain(str(error))

@@ -19,13 +19,14 @@ from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
+from leaderboard.compiling import compile_progress
 from leaderboard.driver import environment_options
 from leaderboard.episode import drive_route
-from leaderboard.jobs import Job, RunSpec
+from leaderboard.jobs import Job, RunSpec, SetupError
 from leaderboard.record import RouteRecord
 from leaderboard.rules import rules_named
 from leaderboard.video import open_video
-from leaderboard.warm_up import SetupError, compile_progress, warm_up
+from leaderboard.warm_up import warm_up
 
 Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
 

@@ -2,35 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
 from agents import load_agent
-from agents.base import Agent, Requirements
+from agents.base import Requirements
 from di_envs.route_env import RouteEnv
 from leaderboard.episode import close_agent, drive_route
 from leaderboard.jobs import Job, RunSpec
 from leaderboard.record import RouteRecord
 from leaderboard.rules import rules_named
+from leaderboard.timed_agent import TimedAgent
+from leaderboard.wall_clock import Doing, Stopwatch
 
 
 class Driver:
     """Drives jobs of one run. The environment is kept; the agent is made anew for each route,
     as in CARLA, so that one that hides its memory cannot carry it from route to route."""
 
-    def __init__(self, spec: RunSpec, requires: Requirements | None = None) -> None:
-        self._spec = spec
+    def __init__(
+        self,
+        spec: RunSpec,
+        requires: Requirements | None = None,
+        watch: Stopwatch | None = None,
+    ) -> None:
+        self.spec, self._watch = spec, watch or Stopwatch()
         self._rules = rules_named(spec.rules)
         self.requires = requires or agent_requirements(spec.agent)
         self.env = RouteEnv(**environment_options(spec.options, self.requires))
 
-    def new_agent(self) -> Agent[Any]:
-        return load_agent(self._spec.agent)
+    def drive(self, job: Job, moved: Callable[[], None] = lambda: None) -> RouteRecord:
+        """Drives one route; never raises for what the agent does.
 
-    def drive(self, job: Job) -> RouteRecord:
-        """Drives one route; never raises for what the agent does."""
-        return drive_route(self.env, self.new_agent, job, self._rules)
+        Args:
+            job: The route and the seed.
+            moved: Called once the first decision was carried out.
+        """
+        self._watch.begin_job()
+        self._watch.mark(Doing.SIMULATING)
+        try:
+            return drive_route(
+                self.env,
+                lambda: TimedAgent(self.spec.agent, self._watch, moved),
+                job,
+                self._rules,
+            )
+        finally:
+            self._watch.end_job()
 
     def __enter__(self) -> Driver:
         return self

@@ -1,140 +1,160 @@
-"""Where jobs run: in this process, or in a pool of processes. The results are the same bits.
+"""Where jobs run: processes of this machine here, a cluster in `ray_engine`. Same bits anywhere.
 
-Each worker builds its own environment and is handed one job at a time. A worker that dies costs
-its own job and is replaced. On Ctrl-C only the parent stops: it keeps what is finished.
+An engine drives what it is given and tells what became of it. It decides nothing: what is tried
+again, kept or shown is for the runner, once for all engines.
 """
 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import signal
-import warnings
 from collections import deque
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait
 from typing import Protocol
 
-from leaderboard.jobs import Job, RunSpec
-from leaderboard.record import RouteRecord
+from leaderboard.jobs import Job, RunSpec, SetupError
+from leaderboard.messages import (
+    Compiling,
+    Died,
+    Driven,
+    EngineEvent,
+    Lost,
+    Pause,
+    Ready,
+    Refused,
+    Scene,
+    Started,
+)
+from leaderboard.wall_clock import Limits
+from leaderboard.worker_process import WorkerProcess
+
+PAUSE_S = 0.25  # longest time without an event
 
 
 class Engine(Protocol):
-    """Drives all jobs and gives each record as it is finished, in any order."""
+    """Drives jobs in processes that can be killed."""
 
-    def run(self, spec: RunSpec, jobs: Sequence[Job]) -> Generator[RouteRecord]: ...
+    def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
+        """Drives all of `jobs`, taken from the left; ends when there are no more.
 
+        Args:
+            spec: What the jobs share.
+            jobs: The caller may add to them while it handles an event; so it does at `Ready`,
+                which comes first, and for a job to be tried again, at `Lost`.
 
-class SerialEngine:
-    """One job after another in this process."""
+        Yields:
+            Events as they happen; `Pause` often enough that the caller can stop in time.
 
-    def run(self, spec: RunSpec, jobs: Sequence[Job]) -> Generator[RouteRecord]:
-        from leaderboard.driver import Driver
-
-        with Driver(spec) as driver:
-            for job in jobs:
-                yield driver.drive(job)
-
-
-@dataclass(kw_only=True)
-class _Worker:
-    process: SpawnProcess
-    connection: Connection
-    job: Job | None = None
+        Raises:
+            SetupError: If the run cannot start.
+        """
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
-class PoolEngine:
-    """Jobs shared out among `workers` fresh processes."""
+class LocalEngine:
+    """Jobs shared out among `workers` processes of this machine; each drives many."""
 
-    workers: int
+    workers: int = 1
+    limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
         if self.workers < 1:
-            raise ValueError(f"a pool needs at least 1 worker, not {self.workers}")
+            raise ValueError(f"an engine needs at least 1 worker, not {self.workers}")
 
-    def run(self, spec: RunSpec, jobs: Sequence[Job]) -> Generator[RouteRecord]:
-        waiting, pool = deque(jobs), list[_Worker]()
-        try:
-            while waiting and len(pool) < self.workers:
-                pool.append(_start_worker(spec, waiting.popleft()))
-            while pool:
-                ready = wait([worker.connection for worker in pool])
-                for worker in [worker for worker in pool if worker.connection in ready]:
-                    yield _receive(worker)
-                    if worker.job is None and waiting:
-                        _hand_over(worker, waiting.popleft())
-                        continue
-                    pool.remove(worker)
-                    _stop(worker)
-                    if waiting:  # only a dead worker leaves while there is work
-                        pool.append(_start_worker(spec, waiting.popleft()))
-        finally:
-            for worker in pool:
-                _stop(worker)
+    def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
+        """See `Engine.run`."""
+        pool = _Pool(self, spec, jobs)
+        with contextlib.closing(pool):
+            while not pool.done:
+                yield from pool.share_out()
+                yield from pool.listen()
 
 
-def _start_worker(spec: RunSpec, job: Job) -> _Worker:
-    """Starts a process with Ctrl-C blocked from birth: it must not die of it while it loads."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs, spec), daemon=True)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    theirs.close()
-    worker = _Worker(process=process, connection=ours)
-    _hand_over(worker, job)
-    return worker
+class _Pool:
+    """The processes of one run.
 
+    The first sets the run up and compiles as it begins to drive; the others load their modules
+    meanwhile, and begin once the machine code is there to be loaded too.
+    """
 
-def _hand_over(worker: _Worker, job: Job) -> None:
-    worker.job = job
-    with contextlib.suppress(OSError):  # a dead worker's pipe says so when we wait for it
-        worker.connection.send(job)
+    def __init__(self, engine: LocalEngine, spec: RunSpec, jobs: deque[Job]) -> None:
+        self._engine, self._spec, self._jobs = engine, spec, jobs
+        self._scene: Scene | None = None
+        self._compiled = False
+        self._workers = [WorkerProcess(spec, engine.limits)]
+        self._workers[0].begin(None)
+        self._begun = {self._workers[0]}
 
+    @property
+    def done(self) -> bool:
+        """Whether all is driven."""
+        idle = all(worker.job is None for worker in self._workers)
+        return self._scene is not None and idle and not self._jobs
 
-def _receive(worker: _Worker) -> RouteRecord:
-    """The record that a worker sends; for a dead worker one that says so, and its job remains."""
-    job = worker.job
-    assert job is not None
-    try:
-        record: RouteRecord = worker.connection.recv()
-    except (EOFError, OSError):
-        from leaderboard.episode_log import lost_record
+    def share_out(self) -> Generator[EngineEvent]:
+        """Hands jobs to workers that have none, and starts as many as there is work for."""
+        if self._scene is None:
+            return
+        busy = sum(worker.job is not None for worker in self._workers)
+        wanted = min(self._engine.workers, busy + len(self._jobs))
+        while len(self._workers) < wanted:
+            self._workers.append(WorkerProcess(self._spec, self._engine.limits))
+        for worker in self._workers:
+            if worker.job is None and self._jobs and self._may_begin(worker):
+                job = self._jobs.popleft()
+                worker.hand_over(job)
+                yield Started(job=job)
 
-        worker.process.join()
-        return lost_record(job, f"the worker process {_death(worker.process.exitcode)}")
-    worker.job = None
-    return record
+    def _may_begin(self, worker: WorkerProcess) -> bool:
+        """Begins with a worker that has not, if the machine code is compiled."""
+        if worker not in self._begun:
+            if not self._compiled and len(self._begun) > 0:
+                return False
+            assert self._scene is not None
+            worker.begin(self._scene.requires)
+            self._begun.add(worker)
+        return True
 
+    def listen(self) -> Generator[EngineEvent]:
+        """Tells what the workers tell, or that there was nothing for a while."""
+        ready = wait(
+            [worker.connection for worker in self._workers]
+            + [worker.sentinel for worker in self._workers],
+            timeout=PAUSE_S,
+        )
+        if not ready:
+            yield Pause()
+        for worker in list(self._workers):
+            for message in worker.receive():
+                match message:
+                    case Ready(scene=scene):
+                        if self._scene is None:
+                            self._scene = scene
+                            yield message
+                    case Refused(reason=reason):
+                        raise SetupError(reason)
+                    case Died():
+                        yield from self._bury(worker, message)
+                    case Driven():
+                        self._compiled = True
+                        worker.job = None
+                        yield message
+                    case _:
+                        self._compiled |= message == Compiling()
+                        yield message
 
-def _death(exitcode: int | None) -> str:
-    if exitcode is not None and exitcode < 0:
-        return f"was killed by {signal.Signals(-exitcode).name}"
-    return f"ended by itself with exit code {exitcode}"
+    def _bury(self, worker: WorkerProcess, death: Died) -> Generator[EngineEvent]:
+        self._workers.remove(worker)
+        self._begun.discard(worker)
+        worker.stop()
+        if self._scene is None:
+            raise SetupError(f"the run cannot be set up: {death.reason}")
+        if worker.job is not None:
+            yield Lost(job=worker.job, status=death.status, reason=death.reason)
 
-
-def _stop(worker: _Worker) -> None:
-    worker.connection.close()
-    if worker.job is None:
-        worker.process.join(timeout=5.0)  # idle: it ends when its pipe closes
-    worker.process.terminate()
-    worker.process.join()
-    worker.process.close()
-
-
-def _serve(connection: Connection, spec: RunSpec) -> None:
-    """A worker's life: build the environment, drive what it is handed until the pipe closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    warnings.simplefilter("ignore", UserWarning)  # the parent has shown them as it warmed up
-    from leaderboard.driver import Driver
-
-    with Driver(spec) as driver, contextlib.suppress(EOFError, OSError):  # the parent is done
-        while True:
-            job: Job = connection.recv()
-            connection.send(driver.drive(job))
+    def close(self) -> None:
+        """Ends all processes."""
+        for worker in self._workers:
+            worker.stop()

@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 
+class SetupError(Exception):
+    """The run cannot start: the agent, the town or an option is wrong; says what to do."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunSpec:
     """What all jobs of a run share; small, so that it travels to worker processes.

@@ -154,16 +154,19 @@ class RunRecord:
     """A run of one agent over routes and seeds, finished or not.
 
     Attributes:
+        agent_hash: Of the code, and of the files, that the agent's name leads to.
         suite_version: 0 for routes of the user's own.
         options: Environment options that differ from the defaults.
         versions: Package name to version, for all that can change bits.
         cpu: CPU capability that the kernels were compiled for.
+        routes_hash: Of the ids and points of all routes that the run is over.
         planned: Number of (route, seed) pairs that were asked for.
         routes: Those driven, by `index`.
     """
 
     rules: str
     agent: str
+    agent_hash: str
     track: str
     requires: Mapping[str, Any]
     suite: str
@@ -171,6 +174,7 @@ class RunRecord:
     options: Mapping[str, Any]
     town: str
     town_hash: str
+    routes_hash: str
     seeds: tuple[int, ...]
     versions: Mapping[str, str]
     cpu: str

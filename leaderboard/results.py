@@ -41,27 +41,45 @@ class ResultsError(Exception):
     """A result folder or file that cannot be used; the message says what to do."""
 
 
-def prepare_folder(folder: Path, *, overwrite: bool = False) -> None:
+class DamagedError(ResultsError):
+    """A file of ours that is cut short or garbled."""
+
+
+def prepare_folder(folder: Path, *, overwrite: bool = False, resume: bool = False) -> None:
     """Makes the folder, and makes sure before any work starts that results can be written there.
 
+    Args:
+        folder: Where the results are to go.
+        overwrite: Take away those of an earlier run.
+        resume: Leave them, to be continued.
+
     Raises:
-        ResultsError: If it cannot be written to, or holds results and `overwrite` is not set.
+        ResultsError: If it cannot be written to, or holds results and neither is set.
     """
     for name in (RECORD_FILE, CARLA_FILE):
-        if (folder / name).exists() and not overwrite:
+        if (folder / name).exists() and not (overwrite or resume):
             raise ResultsError(
-                f"{folder} already holds {name}: choose another --output, or pass --overwrite"
+                f"{folder} already holds {name}: choose another --output, pass --resume to "
+                "continue that run, or --overwrite to replace it"
             )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
+        _remove_scratch(folder)
         if overwrite:
             _remove_results(folder)
     except OSError as error:
         raise ResultsError(
             f"cannot write results to {folder} ({error.strerror}): choose another --output"
         ) from error
+
+
+def _remove_scratch(folder: Path) -> None:
+    """Takes away what a killed process was writing, and had not finished."""
+    for place in (folder, folder / ROUTES_FOLDER):
+        for path in place.glob(".*.json.*"):
+            path.unlink(missing_ok=True)
 
 
 def _remove_results(folder: Path) -> None:
@@ -193,21 +211,37 @@ def read_run(path: Path) -> RunRecord:
             another format version, or of another run.
     """
     folder = run_folder(path)
-    run = _parsed(folder / RECORD_FILE, FORMAT, run_from_json)
-    owner = run_hash(run)
-    records = []
-    for file in route_files(folder):
-        content = _content(file, ROUTE_FORMAT)
-        if content.get("run") != owner:
-            raise ResultsError(
-                f"{file} belongs to another run than {folder / RECORD_FILE}: put the file of its "
-                "own run there, or remove it and continue with `driveinsight evaluate --resume`"
-            )
-        record = _parse(file, content, route_from_json)
-        if file.stem != f"{record.index:04d}" or record.index >= run.planned:
-            raise ResultsError(f"{file} holds route number {record.index}: it was renamed")
-        records.append(record)
-    return dataclasses.replace(run, routes=tuple(records))
+    run = read_head(folder)
+    records = tuple(read_route(file, run) for file in route_files(folder))
+    return dataclasses.replace(run, routes=records)
+
+
+def read_head(folder: Path) -> RunRecord:
+    """Reads what was asked for of the run in a folder, and none of its routes.
+
+    Raises:
+        ResultsError: As `read_run`.
+    """
+    return _parsed(folder / RECORD_FILE, FORMAT, run_from_json)
+
+
+def read_route(file: Path, run: RunRecord) -> RouteRecord:
+    """Reads one route of a run.
+
+    Raises:
+        DamagedError: If the file is cut short or garbled.
+        ResultsError: If it is foreign, of another format version, or of another run.
+    """
+    content = _content(file, ROUTE_FORMAT)
+    if content.get("run") != run_hash(run):
+        raise ResultsError(
+            f"{file} belongs to another run than the {RECORD_FILE} beside it: put the file of its "
+            "own run there, or remove it and continue with `driveinsight evaluate --resume`"
+        )
+    record = _parse(file, content, route_from_json)
+    if file.stem != f"{record.index:04d}" or record.index >= run.planned:
+        raise ResultsError(f"{file} holds route number {record.index}: it was renamed")
+    return record
 
 
 def _parsed(path: Path, form: str, parse: Callable[[Mapping[str, Any]], _Value]) -> _Value:
@@ -219,7 +253,7 @@ def _content(path: Path, form: str) -> Mapping[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
-        raise ResultsError(
+        raise DamagedError(
             f"{path} is not whole JSON ({error}): fetch it again from where it came, or remove it "
             "and evaluate again"
         ) from error
@@ -242,7 +276,7 @@ def _parse(
     try:
         return parse(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ResultsError(
+        raise DamagedError(
             f"{path} lacks or garbles a field ({error!r}): evaluate again"
         ) from error
 

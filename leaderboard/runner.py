@@ -1,30 +1,50 @@
-"""Evaluates an agent over routes and seeds: jobs out, records in, files kept up to date.
+"""Evaluates an agent over routes and seeds: jobs out, records in, a file for each as it is done.
 
-Whatever stops the run, Ctrl-C included, what was finished by then is on disk and in the table.
+An engine says what became of each job; what follows from that is decided here. A route that the
+machinery lost is tried once more, then recorded as lost. Whatever stops the run, what was finished
+by then is on disk, and a later process continues from there.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import signal
-import threading
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+import warnings
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from enum import Enum
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from di_envs.kernels import cpu_capability
 from di_envs.suites import Suite
-from leaderboard.engines import Engine, PoolEngine, SerialEngine
+from leaderboard.engines import Engine, LocalEngine
+from leaderboard.folder_lock import folder_lock
+from leaderboard.interruption import interruptible
 from leaderboard.jobs import Job, RunSpec, plan_jobs
+from leaderboard.messages import (
+    Compiling,
+    Driven,
+    EngineEvent,
+    Lost,
+    Ready,
+    Scene,
+    Started,
+    Warned,
+)
 from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.results import add_route, start_run
-from leaderboard.versions import package_versions
-from leaderboard.warm_up import Scene, warm_up
+from leaderboard.results import add_route, prepare_folder, start_run
+from leaderboard.resuming import resumed
+from leaderboard.run_display import RunDisplay
+
+
+class Existing(Enum):
+    """What to do with results that the folder holds already."""
+
+    REFUSE = "refuse"
+    OVERWRITE = "overwrite"
+    RESUME = "resume"
 
 
 def evaluate(
@@ -33,17 +53,19 @@ def evaluate(
     *,
     suite: Suite,
     folder: Path,
-    workers: int = 1,
+    engine: Engine | None = None,
+    existing: Existing = Existing.REFUSE,
     console: Console | None = None,
 ) -> RunRecord:
-    """Drives every route of the environment with every seed; writes the files after each.
+    """Drives every route of the environment with every seed; writes each as it is finished.
 
     Args:
         spec: The agent, the environment's options and the rules.
         seeds: Each gives every route a world of its own; see `Job.world_seed`.
         suite: The set of routes that the options name.
-        folder: Where the files go; see `results.prepare_folder`.
-        workers: Number of processes; 1 drives in this one.
+        folder: Where the files go; see `results`.
+        engine: Where the routes are driven; None for one process beside this one.
+        existing: What to do with results in the folder.
         console: Where progress is shown.
 
     Returns:
@@ -51,46 +73,107 @@ def evaluate(
 
     Raises:
         SetupError: If the agent or an option is wrong.
-        ResultsError: If the folder cannot be written to.
+        ResultsError: If the folder cannot be written to, is in use, holds results that are not
+            to be replaced, or results that this run cannot continue.
     """
     console = console or Console(stderr=True)
-    with _sigterm_as_ctrl_c():
-        scene = warm_up(spec, console)
-        jobs = plan_jobs(scene.route_ids, seeds)
-        run = new_run(spec, jobs, suite, scene)
-        start_run(folder, run)
-        engine: Engine = SerialEngine() if workers == 1 else PoolEngine(workers=workers)
-        try:
-            with closing(_driven(engine, spec, jobs, console)) as records:
-                for record in records:
-                    run = with_route(run, record)
-                    add_route(folder, run, record)
-        except KeyboardInterrupt:
+    with folder_lock(folder), interruptible() as interruption:
+        prepare_folder(
+            folder,
+            overwrite=existing is Existing.OVERWRITE,
+            resume=existing is Existing.RESUME,
+        )
+        with RunDisplay(console) as display:
+            evaluation = _Evaluation(
+                spec=spec,
+                seeds=seeds,
+                suite=suite,
+                folder=folder,
+                resume=existing is Existing.RESUME,
+                display=display,
+            )
+            engine = engine or LocalEngine()
+            with closing(engine.run(spec, evaluation.jobs)) as events:
+                for event in events:
+                    evaluation.take(event)
+                    if interruption.requested:
+                        break
+        run = evaluation.run
+        if run is None:  # stopped before it was known what there is to drive
+            raise KeyboardInterrupt
+        if interruption.requested:
             console.print(f"interrupted: {len(run.routes)} of {run.planned} routes are kept")
-    return run
+        return run
 
 
-def _driven(
-    engine: Engine, spec: RunSpec, jobs: Sequence[Job], console: Console
-) -> Generator[RouteRecord]:
-    """The engine's records, with a progress bar and a line for each route that crashed."""
-    progress = Progress(
-        TextColumn("  driving  "),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-        console=console,
-    )
-    with progress, closing(engine.run(spec, jobs)) as records:
-        task = progress.add_task("", total=len(jobs))
-        for record in records:
-            what = f"route {record.route_id}, seed {record.seed}"
-            if record.crashed:
-                progress.print(f"[red]{what}: {record.status}[/red]: {record.reason}")
-            score = record.score.driving_score
-            progress.update(task, advance=1, description=f"{what}: DS {score:.1f}")
-            yield record
+class _Evaluation:
+    """The books of a run: what is to do, what is done, what is tried again."""
+
+    def __init__(
+        self,
+        *,
+        spec: RunSpec,
+        seeds: Sequence[int],
+        suite: Suite,
+        folder: Path,
+        resume: bool,
+        display: RunDisplay,
+    ) -> None:
+        self._spec, self._seeds, self._suite = spec, seeds, suite
+        self._folder, self._resume, self._display = folder, resume, display
+        self._again: set[int] = set()
+        self.jobs: deque[Job] = deque()
+        self.run: RunRecord | None = None
+
+    def take(self, event: EngineEvent) -> None:
+        """Does what an engine's event asks for."""
+        match event:
+            case Ready(scene=scene):
+                self._begin(scene)
+            case Started(job=job):
+                self._display.started(job)
+            case Driven(job=job, record=record):
+                if not (record.lost and self._try_again(job, record.status, record.reason)):
+                    self._keep(record)
+            case Lost(job=job, status=status, reason=reason):
+                if not self._try_again(job, status, reason):
+                    self._keep(_lost_record(job, status, reason))
+            case Compiling():
+                self._display.compiling(event)
+            case Warned(text=text):
+                warnings.warn(text, stacklevel=2)
+
+    def _begin(self, scene: Scene) -> None:
+        jobs = plan_jobs(scene.route_ids, self._seeds)
+        run = new_run(self._spec, jobs, self._suite, scene)
+        if self._resume:
+            run = resumed(self._folder, run)
+        start_run(self._folder, run)
+        done = {record.index for record in run.routes}
+        self.run = run
+        self.jobs.extend(job for job in jobs if job.index not in done)
+        self._display.plan(len(jobs), len(done))
+
+    def _try_again(self, job: Job, status: str, reason: str) -> bool:
+        """Queues a job that the machinery lost; False if it has been tried again before."""
+        if job.index in self._again:
+            return False
+        self._again.add(job.index)
+        self.jobs.append(job)
+        self._display.again(job, status, reason)
+        return True
+
+    def _keep(self, record: RouteRecord) -> None:
+        assert self.run is not None
+        self.run = with_route(self.run, record)
+        add_route(self._folder, self.run, record)
+        self._display.finished(record)
+
+
+def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
+    from leaderboard.episode_log import lost_record  # loads what only workers need
+
+    return dataclasses.replace(lost_record(job, reason), status=status)
 
 
 def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> RunRecord:
@@ -99,11 +182,13 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
     return RunRecord(
         rules=spec.rules,
         agent=spec.agent,
+        agent_hash=scene.agent_hash,
         track=str(requires.track),
         requires={
             "observations": list(requires.observations),
             "control_dt_s": requires.control_dt_s,
             "privileged": requires.privileged,
+            "hd_map": requires.hd_map,
             "options": _as_json(requires.options),
         },
         suite=suite.name,
@@ -111,9 +196,10 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
         options={name: _as_json(value) for name, value in spec.options.items()},
         town=scene.town,
         town_hash=scene.town_hash,
+        routes_hash=scene.routes_hash,
         seeds=tuple(dict.fromkeys(job.seed for job in jobs)),
-        versions=package_versions(),
-        cpu=cpu_capability(),
+        versions=scene.versions,
+        cpu=scene.cpu,
         planned=len(jobs),
     )
 
@@ -132,20 +218,3 @@ def with_route(run: RunRecord, record: RouteRecord) -> RunRecord:
     """The run with one more record, in the order of the jobs whatever finished first."""
     routes = sorted((*run.routes, record), key=lambda record: record.index)
     return dataclasses.replace(run, routes=tuple(routes))
-
-
-@contextmanager
-def _sigterm_as_ctrl_c() -> Iterator[None]:
-    """Makes SIGTERM stop the run as Ctrl-C does, so that batch systems lose nothing either."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set handlers
-        return
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,11 @@ from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera_config import CameraConfig, Rig
 from di_envs.sensors.lidar_config import LidarConfig
-from leaderboard.engines import PoolEngine, SerialEngine
+from leaderboard.driver import Driver
+from leaderboard.engines import LocalEngine
 from leaderboard.episode_hash import EpisodeHash
 from leaderboard.jobs import RunSpec, plan_jobs
+from leaderboard.messages import Driven
 
 # Every sensor, small as a whole route is driven many times; night and rain have light and draws of
 # their own
@@ -55,12 +58,12 @@ ROUTE, SEED = "1", 3
 SCRIPT = f"""
 from di_envs.sensors.camera_config import CameraConfig, Rig
 from di_envs.sensors.lidar_config import LidarConfig
-from leaderboard.engines import SerialEngine
+from leaderboard.driver import Driver
 from leaderboard.jobs import RunSpec, plan_jobs
-spec = RunSpec(agent="expert", options={OPTIONS})
-for record in SerialEngine().run(spec, plan_jobs(["{ROUTE}"], [{SEED}])):
-    print(record.status, record.steps)
-    print(record.observation_hash, record.reward_hash, record.event_hash)
+(job,) = plan_jobs(["{ROUTE}"], [{SEED}])
+record = Driver(RunSpec(agent="expert", options={OPTIONS})).drive(job)
+print(record.status, record.steps)
+print(record.observation_hash, record.reward_hash, record.event_hash)
 """
 
 
@@ -77,7 +80,8 @@ def test_two_fresh_processes_see_the_same_bits_over_a_whole_route():
     ]
     assert outs[0] == outs[1]
     spec = RunSpec(agent="expert", options=OPTIONS)
-    (here,) = SerialEngine().run(spec, plan_jobs([ROUTE], [SEED]))
+    (job,) = plan_jobs([ROUTE], [SEED])
+    here = Driver(spec).drive(job)
     hashes = f"{here.observation_hash} {here.reward_hash} {here.event_hash}"
     assert outs[0] == f"{here.status} {here.steps}\n{hashes}\n"
     assert here.steps > 50
@@ -87,14 +91,14 @@ def test_two_fresh_processes_see_the_same_bits_over_a_whole_route():
 def test_one_worker_two_and_the_reverse_order_drive_the_same_bits():
     spec = RunSpec(agent="expert", options=OPTIONS)
     jobs = plan_jobs(["0", "1", "4", "6"], [SEED, SEED + 1])
-    by_way = [
-        {record.index: record.fingerprint() for record in engine.run(spec, ordered)}
-        for engine, ordered in (
-            (SerialEngine(), jobs),
-            (SerialEngine(), jobs[::-1]),
-            (PoolEngine(workers=2), jobs),
-        )
-    ]
+    with Driver(spec) as driver:
+        by_way = [
+            {job.index: driver.drive(job).fingerprint() for job in ordered}
+            for ordered in (jobs, jobs[::-1])
+        ]
+    events = LocalEngine(workers=2).run(spec, deque(jobs))
+    driven = [event for event in events if isinstance(event, Driven)]
+    by_way.append({event.job.index: event.record.fingerprint() for event in driven})
     assert by_way[0] == by_way[1] == by_way[2]
     assert len(set(by_way[0].values())) == len(jobs)
 

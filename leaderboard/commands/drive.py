@@ -43,9 +43,8 @@ class Drive(SceneArguments):
         options, _ = self.choose(() if self.route is None else (self.route,))
 
         from leaderboard.drive import drive, record_lines
-        from leaderboard.jobs import RunSpec
+        from leaderboard.jobs import RunSpec, SetupError
         from leaderboard.video import VideoError, check_video
-        from leaderboard.warm_up import SetupError
 
         spec = RunSpec(agent=self.agent, options=options, rules=self.rules)
         try:

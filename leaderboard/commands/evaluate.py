@@ -13,19 +13,23 @@ from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageErr
 from leaderboard.commands.scene_arguments import SceneArguments, says
 
 if TYPE_CHECKING:
+    from leaderboard.engines import Engine
     from leaderboard.record import RunRecord
+    from leaderboard.runner import Existing
 
 EVALUATE_HELP = """Drive an agent over routes and seeds, and print the leaderboard table.
 
 Examples:
   driveinsight evaluate --agent expert --suite town05_short
   driveinsight evaluate --agent expert --suite town05_long --seeds 3 --workers 2
+  driveinsight evaluate --agent expert --suite town05_long --seeds 3 --workers 2 --resume
   driveinsight evaluate --agent path/to/mine.py:MyAgent --suite town05_tiny --route-ids 0 3
   driveinsight evaluate --agent expert --town Town05.xodr --signals town05 \\
       --routes routes_town05_long.xml --scenarios scenarios/
   driveinsight evaluate --agent expert --suite town05_long --scenarios none
 
-Writes results.json (CARLA's schema) and driveinsight.json (everything) into --output."""
+Writes results.json (CARLA's schema) and driveinsight.json with routes/ (everything) into --output,
+each route as it is finished: after Ctrl-C or a crash, the same command with --resume continues."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,28 +51,41 @@ class Evaluate(SceneArguments):
     overwrite: tyro.conf.FlagCreatePairsOff[bool] = False
     """Replace results that the folder holds already."""
 
+    resume: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Continue the run that the folder holds; start it if there is none."""
+
+    step_timeout: Annotated[float, says("S", "60")] = 60.0
+    """Wall-clock seconds that one decision of the agent may take."""
+
+    setup_timeout: Annotated[float, says("S", "300")] = 300.0
+    """Wall-clock seconds that making the agent, or loading the town, may take."""
+
+    route_timeout: Annotated[float, says("S", "7200")] = 7200.0
+    """Wall-clock seconds that a route may take. Who exceeds one of these is killed; the route is
+    tried once more, then left out of the means: it says nothing of the driving."""
+
     def run(self) -> int:
         """Evaluates; returns the exit code."""
         if self.seeds < 1 or self.workers < 1:
             raise UsageError("--seeds and --workers must be at least 1")
+        if self.overwrite and self.resume:
+            raise UsageError("--overwrite and --resume exclude each other: choose one")
         options, suite = self.choose(self.route_ids)
-        folder = self.output or _new_folder(f"{_plain(self.agent)}-{_plain(suite.name)}")
+        folder = self.output or self._default_folder(suite.name)
 
-        from leaderboard.results import ResultsError, prepare_folder
-
-        try:
-            prepare_folder(folder, overwrite=self.overwrite)
-        except ResultsError as error:
-            raise UsageError(str(error)) from error
-
-        from leaderboard.jobs import RunSpec
+        from leaderboard.jobs import RunSpec, SetupError
+        from leaderboard.results import ResultsError
         from leaderboard.runner import evaluate
-        from leaderboard.warm_up import SetupError
 
         spec = RunSpec(agent=self.agent, options=options, rules=self.rules)
         try:
             run = evaluate(
-                spec, range(self.seeds), suite=suite, folder=folder, workers=self.workers
+                spec,
+                range(self.seeds),
+                suite=suite,
+                folder=folder,
+                engine=self._engine(),
+                existing=self._existing(),
             )
         except (SetupError, ResultsError) as error:
             raise UsageError(str(error)) from error
@@ -79,19 +96,39 @@ class Evaluate(SceneArguments):
             return EXIT_INTERRUPTED
         return EXIT_CRASHED if run.lost else 0
 
+    def _engine(self) -> Engine:
+        from leaderboard.engines import LocalEngine
+        from leaderboard.wall_clock import Limits
+
+        try:
+            limits = Limits(
+                step_s=self.step_timeout, setup_s=self.setup_timeout, route_s=self.route_timeout
+            )
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        return LocalEngine(workers=self.workers, limits=limits)
+
+    def _existing(self) -> Existing:
+        from leaderboard.runner import Existing
+
+        if self.resume:
+            return Existing.RESUME
+        return Existing.OVERWRITE if self.overwrite else Existing.REFUSE
+
+    def _default_folder(self, suite: str) -> Path:
+        """`results/AGENT-SUITE`, or -2 and so on where that is taken; the last one to resume."""
+        name = f"{_plain(self.agent)}-{_plain(suite)}"
+        folder, number = Path("results") / name, 2
+        last = folder
+        while folder.exists():
+            last, folder, number = folder, Path("results") / f"{name}-{number}", number + 1
+        return last if self.resume else folder
+
 
 def _plain(name: str) -> str:
     """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
     last = name.rpartition(":")[2]
     return "".join(c if c.isalnum() or c in "_-." else "_" for c in last)
-
-
-def _new_folder(name: str) -> Path:
-    """`results/NAME`, or `results/NAME-2` and so on where that is taken."""
-    folder, number = Path("results") / name, 2
-    while folder.exists():
-        folder, number = Path("results") / f"{name}-{number}", number + 1
-    return folder
 
 
 def _remove_if_empty(folder: Path) -> None:

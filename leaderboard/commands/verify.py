@@ -48,10 +48,10 @@ class Verify:
         if self.workers < 1:
             raise UsageError("--workers must be at least 1")
 
+        from leaderboard.compiling import compile_progress
         from leaderboard.replay import ReplayError
         from leaderboard.results import ResultsError, read_run, run_folder
         from leaderboard.verify import verify_run
-        from leaderboard.warm_up import compile_progress
 
         console = Console(stderr=True)
         try:

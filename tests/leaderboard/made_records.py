@@ -37,6 +37,7 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
     values = {
         "rules": "carla-1.0",
         "agent": "expert",
+        "agent_hash": "ee",
         "track": "PRIVILEGED",
         "requires": {"observations": ["prompt"]},
         "suite": "town05_long",
@@ -44,6 +45,7 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
         "options": {"traffic": 3},
         "town": "town05",
         "town_hash": "ff",
+        "routes_hash": "gg",
         "seeds": (0, 1),
         "versions": {"python": "3.11"},
         "cpu": "generic",

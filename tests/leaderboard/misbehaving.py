@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
+import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +14,7 @@ import numpy as np
 from agents.base import Requirements
 from leaderboard.jobs import Job
 
+FOR_EVER_S = 3600.0
 BRAKE = np.array([0.0, 0.0, 1.0], dtype=np.float32)
 
 
@@ -70,6 +74,62 @@ class FailsAtStart(Brakes):
         raise RuntimeError("no weights")
 
 
+class Dawdles(Brakes):
+    """No step is long, but there is no end to them."""
+
+    def act(self, observation: Any, memory: int) -> tuple[Any, int]:
+        time.sleep(0.1)
+        return BRAKE, memory
+
+
+class ReturnsNone(Brakes):
+    def act(self, observation: Any, memory: int) -> Any:
+        return None
+
+
+class Sleeps(Brakes):
+    def misbehave(self) -> Any:
+        time.sleep(FOR_EVER_S)
+
+
+class SleepsWithPythonsLock(Brakes):
+    """As a library does that computes for ever without letting Python go."""
+
+    def misbehave(self) -> Any:
+        ctypes.PyDLL(None).sleep(int(FOR_EVER_S))
+
+
+class SleepsAtStart(Brakes):
+    def start(self, plan: Any, seed: int) -> int:
+        time.sleep(FOR_EVER_S)
+        return 0
+
+
+class SleepsWhenMade(Brakes):
+    def __init__(self) -> None:
+        time.sleep(FOR_EVER_S)
+
+
+class RaisesWhenMade(Brakes):
+    def __init__(self) -> None:
+        raise OSError("no weights")
+
+
+class EndsItsProcessWhenMade(Brakes):
+    def __init__(self) -> None:
+        os._exit(7)
+
+
+class EndsItsProcess(Brakes):
+    def misbehave(self) -> Any:
+        os._exit(7)
+
+
+class Segfaults(Brakes):
+    def misbehave(self) -> Any:
+        ctypes.string_at(0)
+
+
 class FailsToClose(Brakes):
     def close(self) -> None:
         raise RuntimeError("already closed")
@@ -88,28 +148,52 @@ class RaisesOnSeedTwo(_OnSeedTwo):
         raise ValueError("I do not like this seed")
 
 
-class InterruptsTheRun(_OnSeedTwo):
-    def misbehave(self) -> Any:
-        os.kill(os.getpid(), signal.SIGINT)
-        return BRAKE
-
-
-class TerminatesTheParent(_OnSeedTwo):
+class TerminatesTheRun(_OnSeedTwo):
     def misbehave(self) -> Any:
         os.kill(os.getppid(), signal.SIGTERM)
-        return BRAKE
+        time.sleep(FOR_EVER_S)
 
 
-class InterruptsParentAndWorker(_OnSeedTwo):
+class InterruptsTheRun(_OnSeedTwo):
     """As Ctrl-C in a terminal does: everybody in the foreground gets the signal."""
 
     def misbehave(self) -> Any:
         os.kill(os.getpid(), signal.SIGINT)
         os.kill(os.getppid(), signal.SIGINT)
+        time.sleep(FOR_EVER_S)
+
+
+class InterruptsTwice(_OnSeedTwo):
+    """A second Ctrl-C, once the first has been seen: it follows in the parent's handler's wake."""
+
+    def misbehave(self) -> Any:
+        for _ in range(2):
+            os.kill(os.getppid(), signal.SIGINT)
+            time.sleep(0.01)
+        time.sleep(FOR_EVER_S)
+
+
+class KillsTheGroup(_OnSeedTwo):
+    """As a machine that goes down does."""
+
+    def misbehave(self) -> Any:
+        os.killpg(os.getpgrp(), signal.SIGKILL)
         return BRAKE
 
 
 class KillsItsWorker(_OnSeedTwo):
     def misbehave(self) -> Any:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return BRAKE
+
+
+class KillsItsWorkerOnce(_OnSeedTwo):
+    """A fault that comes and goes, as of a machine: the file beside this one remembers it."""
+
+    def misbehave(self) -> Any:
+        mark = Path("killed-once")  # in the working folder, which is the test's
+        if mark.exists():
+            return BRAKE
+        mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
         return BRAKE
