@@ -74,6 +74,11 @@ class Course:
             )
         return int(route)
 
+    @property
+    def weather(self) -> str:
+        """What cameras see at the start of an episode."""
+        return self.config.weather or "ClearNoon"
+
     def observation_space(self) -> spaces.Dict:
         """The space of what an ego sees."""
         config = self.config
@@ -90,7 +95,7 @@ class Course:
             cameras=config.cameras,
             lidar=config.lidar,
             half_sweeps=config.half_sweeps,
-            weather=config.weather,
+            weather=self.weather,
         )
 
     def ending(

@@ -180,7 +180,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
             self._draw(self.agents[0], observations)
         for name, ego in driving.items():
             if terminated[name] or truncated[name]:
-                self.world.remove_ego(ego)
+                self.world.remove_actor(ego)
                 self.agents.remove(name)
         return observations, rewards, terminated, truncated, infos
 

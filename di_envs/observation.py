@@ -176,7 +176,11 @@ def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no
 
 
 class Observer:
-    """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables."""
+    """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables.
+
+    Attributes:
+        weather: What cameras see from the next `start` on.
+    """
 
     def __init__(
         self,
@@ -204,7 +208,7 @@ class Observer:
         self._rig = rig_of(cameras) if "camera" in groups else None
         self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
         self._half_sweeps = half_sweeps
-        self._weather = weather_of(weather or "ClearNoon")
+        self.weather = weather or "ClearNoon"
         self._ego, self._town = ego, town
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
@@ -233,7 +237,8 @@ class Observer:
         )
         self._cameras: CameraRig | None = None
         if self._rig is not None:
-            self._cameras = CameraRig(self._town, self._rig, self._weather, self._ego)
+            weather = weather_of(self.weather)
+            self._cameras = CameraRig(self._town, self._rig, weather, self._ego)
             self._cameras.start(view)
         self._lidar: Lidar | None = None
         if self._lidar_config is not None:

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 
 from di_envs.actions import action_space, checked_action
-from di_envs.config import check_name
+from di_envs.config import WEATHERS, check_name
 from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
 from di_envs.reward import standing_of
@@ -34,6 +34,7 @@ class RouteEnvSnapshot:
 
     world: Snapshot | None  # None before the first reset
     over: bool
+    weather: str
     np_random: Mapping[str, Any]
     np_random_seed: int
 
@@ -127,6 +128,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         index = self._route_index(dict(options or {}), world_seed)
         self.world.reset(world_seed, [self.plans[index]])
         self._begun, self._over = True, False
+        self._observer.weather = self._course.weather
         self._observer.start(self.view)
         standing = standing_of(self.view.state, _EGO)
         info = self._course.info(self.view, _EGO, standing, standing, ())
@@ -192,11 +194,26 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self.view  # noqa: B018 (raises before the first reset)
         return self._observer.observe()
 
+    def change_weather(self, weather: str) -> None:
+        """Changes what cameras see, until the next reset.
+
+        Args:
+            weather: One of CARLA's presets.
+
+        Raises:
+            ValueError: If it is unknown.
+            RuntimeError: Before the first reset.
+        """
+        check_name(weather, WEATHERS, "weather")
+        self._observer.weather = weather
+        self._observer.start(self.view)
+
     def save_state(self) -> RouteEnvSnapshot:
         """A value from which `restore_state` brings everything back. See `di_envs.save`."""
         return RouteEnvSnapshot(
             world=self.world.save() if self._begun else None,
             over=self._over,
+            weather=self._observer.weather,
             np_random=self.np_random.bit_generator.state,
             np_random_seed=self.np_random_seed,
         )
@@ -207,6 +224,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         Raises:
             ValueError: If the snapshot is of another town or of other numbers of actors.
         """
+        self._observer.weather = snapshot.weather
         if snapshot.world is not None:
             self.world.restore(snapshot.world)
             self._observer.start(self.view)

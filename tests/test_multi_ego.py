@@ -147,7 +147,7 @@ def test_an_egos_front_camera_shows_the_other_ahead_of_it():
     """Two egos on one road, then the leader off the road: only the follower's picture changes."""
     env = one_behind_the_other(10, observations=("camera",))
     before = env._observe()
-    env.world.remove_ego(1)
+    env.world.remove_actor(1)
     after = env._observe()["ego_0"]
     changed = (before["ego_0"]["camera_front"] != after["camera_front"]).any(axis=2)
     rows, columns = np.nonzero(changed)
@@ -186,7 +186,7 @@ def test_an_ego_whose_route_has_ended_is_seen_once_more_and_then_is_gone():
 
 def test_the_others_drive_on_through_where_one_has_left():
     env = one_behind_the_other(15)
-    env.world.remove_ego(1)
+    env.world.remove_actor(1)
     env.agents.remove("ego_1")
     for _ in range(40):
         observations, _, terminated, truncated, infos = env.step({"ego_0": GO})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,9 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.kernels import bind
+from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.approach import make_requests
+from di_envs.world.changes import (
+    ChangeError,
+    check_actor,
+    force_light,
+    move_vehicle_to,
+    move_walker_to,
+    remove_actor,
+)
 from di_envs.world.dynamics import EgoModel, locate_ego
 from di_envs.world.event_rows import COLUMNS, ROWS_PER_EGO
 from di_envs.world.events import begin_events
@@ -179,13 +189,48 @@ class World:
             ticks -= batch
         return events
 
-    def remove_ego(self, ego: int) -> None:
-        """Takes an ego off the road for the rest of the episode; what it has done still counts."""
-        state = self._state
-        state.kind[ego] = ActorKind.ABSENT
-        state.lane[ego] = -1
-        state.occupied[ego] = -1
-        state.speed[ego] = state.acceleration[ego] = state.yaw_rate[ego] = 0.0
+    def remove_actor(self, actor: int) -> None:
+        """Takes an actor off the road for the rest of the episode; what it has done still counts.
+
+        Raises:
+            ChangeError: If it is not there.
+        """
+        remove_actor(self._state, actor)
+
+    def move_actor(self, actor: int, ahead_m: float, right_m: float) -> None:
+        """Sets a vehicle or a walker of the traffic down elsewhere, on a lane or way nearby.
+
+        Args:
+            actor: Its id.
+            ahead_m: How far along its own heading.
+            right_m: How far to its right.
+
+        Raises:
+            ChangeError: If it is not there, or cannot be there.
+        """
+        state, capacity = self._state, self.view.capacity
+        check_actor(state, actor)
+        cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
+        x = float(state.x[actor]) + ahead_m * cos - right_m * sin
+        y = float(state.y[actor]) + ahead_m * sin + right_m * cos
+        if capacity.egos <= actor < self._vehicle_end:
+            move_vehicle_to(state, self.town.lanes, self._tables, actor, x, y)
+        elif self._vehicle_end <= actor < self._vehicle_end + capacity.walkers:
+            move_walker_to(state, self._walk, actor, x, y)
+        else:
+            raise ChangeError(
+                f"actor {actor} cannot be moved: vehicles ({capacity.egos} to "
+                f"{self._vehicle_end - 1}) and walkers (to "
+                f"{self._vehicle_end + capacity.walkers - 1}) of the traffic can"
+            )
+
+    def force_light(self, light: int, shows: LightState) -> None:
+        """Makes a light show one state from now on; NONE gives it back to its turn.
+
+        Raises:
+            ChangeError: If there is no such light.
+        """
+        force_light(self._state, self.town.signals, light, shows)
 
     def save(self) -> Snapshot:
         """Copies the state whole."""
