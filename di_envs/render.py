@@ -79,7 +79,7 @@ class Renderer:
             (HEIGHT_PX, WIDTH_PX, 3) RGB.
         """
         picture = Image.new("RGB", (WIDTH_PX, HEIGHT_PX), _PANEL)
-        picture.paste(self._map(view, ego), (0, 0))
+        picture.paste(self.map(view, ego), (0, 0))
         top = _MARGIN
         camera = (observation or {}).get("camera_front")
         if camera is not None:
@@ -92,8 +92,11 @@ class Renderer:
 
     # ---- the map
 
-    def _map(self, view: WorldView, ego: int) -> Any:
-        """The streets around the ego, with all that moves, the route and the lights."""
+    def map(self, view: WorldView, ego: int = 0) -> Any:
+        """The streets around the ego from above: an image of MAP_PX x MAP_PX.
+
+        Shows all that moves, the route and the lights.
+        """
         state = view.state
         middle = np.array([state.x[ego], state.y[ego]])
         corner = np.floor((middle * PIXELS_A_METRE - MAP_PX / 2) * SMOOTHING).astype(int)

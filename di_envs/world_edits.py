@@ -187,7 +187,9 @@ def world_edit(text: EditText) -> WorldEdit:
     except ValueError as error:
         raise EditError(str(error)) from error
     if text.when:
-        raise EditError(f"'{text}': a world edit happens when it is applied; leave out @{text.when}")
+        raise EditError(
+            f"'{text}': a world edit happens when it is applied; leave out @{text.when}"
+        )
     return WORLD_EDITS[name](text)
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from leaderboard.commands.branch import BRANCH_HELP, Branch
 from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
@@ -39,6 +40,7 @@ Command = (
     | Annotated[Verify, tyro.conf.subcommand("verify", description=VERIFY_HELP)]
     | Annotated[ScoreByRules, tyro.conf.subcommand("score", description=SCORE_HELP)]
     | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]
+    | Annotated[Branch, tyro.conf.subcommand("branch", description=BRANCH_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
 )

@@ -7,7 +7,6 @@ faster than the drive was. On other package versions or another CPU the bits may
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.edit_text import EditError
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera_config import CameraConfig, Rig
 from di_envs.sensors.lidar_config import LidarConfig
@@ -23,6 +23,7 @@ from di_envs.world.world import Event, WorldView
 from leaderboard.episode_log import route_hash
 from leaderboard.jobs import Job
 from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.timed_edits import EditPlan, decisions_before, timed_edits
 
 CHEAPEST = ("inertial",)  # the group of observations that costs least
 _SENSOR_OPTIONS = ("observations", "cameras", "lidar")
@@ -132,10 +133,14 @@ def replay(
 
     Raises:
         ReplayError: If the route is not the recorded one, or the record goes on after its end.
+        EditError: If what was done to the world cannot be done here.
     """
     controls = _controls(record)
     env = env or replay_env(run)
+    edits = _edits(record, env)
     observation, info = _reset(env, record)
+    if edits.apply(env, 0):
+        observation = env.observe()
     yield ReplayStep(
         decision=0,
         time_s=0.0,
@@ -150,6 +155,8 @@ def replay(
     for decision, control in enumerate(controls, start=1):
         observation, reward, terminated, truncated, info = env.step(control)
         over = terminated or truncated
+        if edits.apply(env, decision):
+            observation = env.observe()
         yield ReplayStep(
             decision=decision,
             time_s=round(int(env.view.state.tick) * TICK_S, 6),
@@ -183,7 +190,7 @@ def replay_to(
     """
     env = env or replay_env(run)
     dt_s = env.config.control_dt_s
-    decisions = math.floor(time_s / dt_s + 1e-6)
+    decisions = decisions_before(time_s, dt_s)
     if not 0 <= decisions <= record.steps:
         raise ReplayError(
             f"route {record.route_id}, seed {record.seed} was driven from 0 to "
@@ -193,6 +200,14 @@ def replay_to(
     for _ in range(decisions + 1):
         next(steps)
     return env
+
+
+def _edits(record: RouteRecord, env: RouteEnv) -> EditPlan:
+    """What was done to the world, and when."""
+    try:
+        return EditPlan(timed_edits(record.interventions), env.config.control_dt_s)
+    except EditError as error:
+        raise ReplayError(f"the record's interventions cannot be read: {error}") from error
 
 
 def _controls(record: RouteRecord) -> NDArray[np.float32]:

@@ -40,7 +40,8 @@ def test_the_parts_of_an_edit_have_names():
 
 
 @pytest.mark.parametrize(
-    "text", ["remove", "remove:", ":actor", "remove:actor=", "move:actor=1,ahead", "a:b=1=2", "a b:c"]
+    "text",
+    ["remove", "remove:", ":actor", "remove:actor=", "move:actor=1,ahead", "a:b=1=2", "a b:c"],
 )
 def test_what_has_not_the_form_is_refused_with_an_example(text):
     with pytest.raises(EditError, match=r"expected verb:target=value.*remove:actor=17"):

@@ -1,0 +1,129 @@
+"""`driveinsight branch`: a recorded drive goes on from a moment in a changed world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
+from leaderboard.commands.scene_arguments import says
+
+if TYPE_CHECKING:
+    from leaderboard.record import RouteRecord, RunRecord
+
+BRANCH_HELP = """Ask what would have happened: change the world at a moment of a recorded drive.
+
+Examples:
+  driveinsight branch results/mine --route 3 --at 42.0 --world "remove:actor=17"
+  driveinsight branch results/mine --route 3 --at 42.0 --world "force:light=12,state=red"
+  driveinsight branch results/mine --route 3 --at 42.0 --world "move:actor=17,ahead=8"
+  driveinsight branch results/mine --route 3 --at 42.0 --world "change:weather=HardRainNoon"
+  driveinsight branch results/mine --route 3 --at 42.0       nothing changed: the same again
+
+Edits are joined by `;`. Events name actors and lights by their numbers; a wrong number lists those
+nearby. The agent drives the recorded part again, compared with the record at every decision, then
+drives on. Writes branch.png and the edited drive, which can be shown and verified as any run."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch:
+    """The arguments of `driveinsight branch`."""
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """The run's output folder."""
+
+    route: Annotated[str, tyro.conf.arg(metavar="ID")]
+    """Id of the route."""
+
+    at: Annotated[float, tyro.conf.arg(metavar="SECONDS")]
+    """Game time at which the world is changed."""
+
+    world: Annotated[str, says("EDITS", "none")] = ""
+    """What is changed, such as "remove:actor=17; force:light=3,state=red"."""
+
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Which of the run's seeds."""
+
+    output: Annotated[Path | None, says("DIR", "a new one in RUN")] = None
+    """Folder for the picture and the edited drive."""
+
+    overwrite: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Replace results that the folder holds already."""
+
+    def run(self) -> int:
+        """Branches; returns the exit code."""
+        from di_envs.edit_text import EditError
+        from di_envs.world_edits import read_world_edits
+        from leaderboard.results import ResultsError, prepare_folder, read_run, write_run
+
+        try:
+            edits = read_world_edits(self.world)
+            run = read_run(self.folder)
+            record = _chosen(run, self.route, self.seed)
+            folder = self.output or self._new_folder()
+            prepare_folder(folder, overwrite=self.overwrite)
+        except (EditError, ResultsError) as error:
+            raise UsageError(str(error)) from error
+
+        from leaderboard.branch import BranchError, branch, branch_run, same_future
+        from leaderboard.branch_picture import write_branch_picture
+        from leaderboard.branch_text import branch_tables
+        from leaderboard.replay import ReplayError
+
+        try:
+            with _bar() as bar:
+                task = bar.add_task("", total=record.game_s)
+                futures = branch(
+                    run, record, self.at, edits, on_step=lambda s: bar.update(task, completed=s)
+                )
+            write_run(folder, branch_run(run, futures))
+            picture = folder / "branch.png"
+            write_branch_picture(picture, run, futures)
+        except (BranchError, EditError, ReplayError, ResultsError, OSError) as error:
+            raise UsageError(str(error)) from error
+        Console().print(*branch_tables(futures))
+        if same_future(futures.recorded, futures.edited):
+            say("Both futures are the same, to the bit.")
+        say(
+            f"Written: {picture} and the edited drive beside it.",
+            f"Next: driveinsight verify {folder}",
+        )
+        return EXIT_CRASHED if futures.edited.lost else 0
+
+    def _new_folder(self) -> Path:
+        """`RUN/branch-ROUTE-SECONDS`, or -2 and so on where that is taken."""
+        name = f"branch-{self.route}-{self.at:g}s"
+        folder, number = self.folder / name, 2
+        while folder.exists():
+            folder, number = self.folder / f"{name}-{number}", number + 1
+        return folder
+
+
+def _bar() -> Progress:
+    return Progress(
+        TextColumn("  branching"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+
+
+def _chosen(run: RunRecord, route_id: str, seed: int) -> RouteRecord:
+    """The record of a route and seed."""
+    for record in run.routes:
+        if (record.route_id, record.seed) == (route_id, seed):
+            if record.lost:
+                raise UsageError(f"route {route_id}, seed {seed} was lost: {record.reason}")
+            return record
+    ids = ", ".join(dict.fromkeys(record.route_id for record in run.routes))
+    seeds = ", ".join(map(str, run.seeds))
+    raise UsageError(
+        f"the run has no route {route_id} with seed {seed}; its routes: {ids}; its seeds: {seeds}"
+    )
