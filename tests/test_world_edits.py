@@ -181,17 +181,23 @@ def test_an_edit_that_cannot_be_made_says_why(env, text, message):
 def test_nobody_is_set_down_in_somebody_else(env):
     driven(env)
     state, lanes = env.view.state, env.view.town.lanes
-    pairs = [
+    lane, cars = state.lane, range(1, 41)
+    actor, other = next(
         (a, b)
-        for a in range(1, 41)
-        for b in range(1, 41)
-        if a != b and state.lane[a] == state.lane[b] and lanes.junction[state.lane[a]] < 0
-    ]
-    actor, other = pairs[0]
-    gap = math.hypot(state.x[other] - state.x[actor], state.y[other] - state.y[actor])
-    ahead = gap if state.lane_m[other] > state.lane_m[actor] else -gap
+        for a in cars
+        for b in cars
+        if a != b and lane[a] == lane[b] and lanes.junction[lane[a]] < 0
+        if math.cos(state.yaw[a] - state.yaw[b]) > 0.9
+    )
+    place = state.x[other] - state.x[actor], state.y[other] - state.y[actor]
+    cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
+    onto = MoveActor(
+        actor=actor,
+        ahead_m=cos * place[0] + sin * place[1],
+        right_m=cos * place[1] - sin * place[0],
+    )
     before = [array[actor].copy() for array in (state.x, state.y, state.lane_m, state.path)]
     with pytest.raises(EditError, match=f"would stand in actor {other} there"):
-        apply_world_edits(env, [MoveActor(actor=actor, ahead_m=ahead)])
+        apply_world_edits(env, [onto])
     after = [array[actor] for array in (state.x, state.y, state.lane_m, state.path)]
     assert all(np.array_equal(x, y) for x, y in zip(before, after, strict=True))
