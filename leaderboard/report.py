@@ -30,6 +30,17 @@ SHORT_NAMES = {
     EventKind.MIN_SPEED: "too slow",
 }
 
+# By the Leaderboard's number
+SCENARIO_NAMES = {
+    "1": "debris, and control is lost for a moment",
+    "3": "somebody steps out from behind an obstacle",
+    "4": "somebody crosses after a turn",
+    "7": "crossing traffic gets green too",
+    "8": "unprotected left turn",
+    "9": "right turn into crossing traffic",
+    "10": "crossing without lights",
+}
+
 
 def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int]) -> list[float]:
     """One mean over routes for each seed that has any, of `value`, a property of `Score`."""
@@ -42,7 +53,10 @@ def run_tables(run: RunRecord) -> Group:
     if not run.scored:
         lost = [Text(line) for line in _lost_lines(run)]
         return Group(Text("no route was finished: there is nothing to show"), *lost)
-    return Group(_route_table(run), _infraction_table(run), Text(_caption(run), style="dim"))
+    tables = [_route_table(run), _infraction_table(run)]
+    if any(record.scenarios for record in run.scored):
+        tables.append(_scenario_table(run))
+    return Group(*tables, Text(_caption(run), style="dim"))
 
 
 def print_run(run: RunRecord, console: Console) -> None:
@@ -151,6 +165,21 @@ def _infraction_table(run: RunRecord) -> Table:
     kinds = count_infractions(happened, rules_named(run.rules))
     for kind, count in kinds.items():
         table.add_row(SHORT_NAMES[kind], str(count), f"{infractions_per_km(count, driven_m):.3f}")
+    return table
+
+
+def _scenario_table(run: RunRecord) -> Table:
+    """How many scenarios of each type began."""
+    table = Table(title="scenarios that began", title_justify="left", title_style="bold")
+    table.add_column("type")
+    table.add_column("what happens")
+    table.add_column("count", justify="right")
+    counts = Counter[str]()
+    for record in run.scored:
+        counts.update(record.scenarios)
+    for number in sorted(counts, key=int):
+        name = SCENARIO_NAMES.get(number, "")
+        table.add_row(f"S{number}", name, str(counts[number]))
     return table
 
 

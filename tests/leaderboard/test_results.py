@@ -335,6 +335,13 @@ def test_the_table_shows_scores_bound_track_and_what_happened():
     assert "one seed (0): no confidence interval" in text
 
 
+def test_the_table_counts_the_scenarios_that_began_by_type():
+    text = _text(run_of(route(scenarios={"3": 2, "10": 1}), route(index=1, scenarios={"3": 1})))
+    rows = [line for line in text.splitlines() if line.startswith(("│ S3 ", "│ S10 "))]
+    assert [row.split()[-2] for row in rows] == ["3", "1"]
+    assert "scenarios that began" not in _text(run_of(route()))
+
+
 def test_the_interval_is_over_seed_means():
     routes = [
         route(
