@@ -34,6 +34,7 @@ ACTOR = {
 }
 EDGE = "#30343a"  # of actors
 BRIDGE_M = 3.0  # what is higher is drawn over the streets below
+_ABOUT = np.array([0.0, 0.0, 0.0, np.pi])  # turns a pose to face backwards
 PIECE = 40  # points of a lane that are drawn as one polygon
 
 
@@ -53,7 +54,38 @@ def surfaces(lanes: Lanes, kind: LaneKind, above: bool) -> list[Array]:
             rows = slice(begin, min(begin + PIECE + 1, end))
             if (lanes.points[rows, 2].mean() > BRIDGE_M) == above:
                 outlines.append(strip(lanes.points[rows], lanes.width_m[rows]))
-    return outlines
+    return outlines + (junction_floors(lanes, above) if kind == LaneKind.DRIVING else [])
+
+
+def junction_floors(lanes: Lanes, above: bool) -> list[Array]:
+    """What is road between the lanes of junctions, where no lane lies: outlines (4, 2).
+
+    Each lane that leads into or out of a junction goes straight on in it, as wide as it is, to the
+    furthest of the junction's lanes that it meets.
+    """
+    inside = (lanes.kind == LaneKind.DRIVING) & (lanes.junction >= 0)
+    by_junction = {
+        int(junction): np.flatnonzero(inside & (lanes.junction == junction))
+        for junction in np.unique(lanes.junction[inside])
+    }
+    floors = []
+    for ways in by_junction.values():
+        rows = np.concatenate([lanes.first[way] + np.arange(lanes.count[way]) for way in ways])
+        points, widths = lanes.points[rows], lanes.width_m[rows]
+        if (points[:, 2].mean() > BRIDGE_M) != above:
+            continue
+        first = lanes.first[ways]
+        mouths = [*lanes.points[first], *(lanes.points[first + lanes.count[ways] - 1] + _ABOUT)]
+        sizes = [*lanes.width_m[first], *lanes.width_m[first + lanes.count[ways] - 1]]
+        for (x, y, _, yaw), width in zip(mouths, sizes, strict=True):
+            c, s = np.cos(yaw), np.sin(yaw)
+            ahead = c * (points[:, 0] - x) + s * (points[:, 1] - y)
+            right = c * (points[:, 1] - y) - s * (points[:, 0] - x)
+            reach = ahead + 0.5 * widths * np.abs(np.sin(points[:, 3] - yaw))
+            depth = reach[(np.abs(right) < 0.5 * width) & (ahead > -0.5)].max()
+            ends = np.array([[x, y, 0.0, yaw], [x + c * depth, y + s * depth, 0.0, yaw]])
+            floors.append(strip(ends, np.full(2, width)))
+    return floors
 
 
 def crosswalk_bars(walks: Crosswalks) -> list[Array]:

@@ -40,7 +40,7 @@ from di_envs.sensors.lidar import Lidar
 from di_envs.sensors.lidar_config import LidarConfig, lidar_of
 from di_envs.sensors.tags import Tag
 from di_envs.sensors.weather import weather_of
-from di_envs.town.lanes import LightState
+from di_envs.town.lanes import Lanes, LightState
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
 from di_envs.world.state import SPEED_HISTORY, ActorKind, State
@@ -158,6 +158,7 @@ class Sight(NamedTuple):
     state: State
     route: PromptRoute
     stop_lines: StopLines
+    lanes: Lanes
     chunks: MapChunks
     geo_origin: NDArray[np.float64]  # (2,) latitude, longitude [deg]
     prompt: Prompt  # written, as are the rest
@@ -171,7 +172,7 @@ def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no
     if with_prompt:
         fill_prompt(sight.state, sight.route, sight.stop_lines, sight.chunks, ego, sight.prompt)
     if with_inertial:
-        fill_imu(sight.state, ego, sight.imu)
+        fill_imu(sight.state, sight.lanes, ego, sight.imu)
         fill_gnss(sight.state, ego, sight.geo_origin[0], sight.geo_origin[1], sight.gnss)
 
 
@@ -226,6 +227,7 @@ class Observer:
             state=view.state,
             route=prompt_route_of(view.plans[self._ego]),
             stop_lines=self._stop_lines,
+            lanes=self._town.lanes,
             chunks=self._chunks,
             geo_origin=self._geo_origin,
             prompt=empty_prompt(),

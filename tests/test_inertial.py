@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -15,6 +16,8 @@ from di_envs.sensors.inertial import (
     fill_imu,
     geodetic,
 )
+from di_envs.town.lanes import LaneKind
+from di_envs.town.loading import load_town
 from di_envs.world.state import Capacity, state_dtype, views_of
 
 
@@ -26,9 +29,15 @@ def state_of(tick=0, seed=1, **values):
     return state
 
 
+@functools.cache
+def town_lanes():
+    return load_town("town05").lanes
+
+
 def imu(**values):
+    """On no lane unless one is given, so level."""
     out = np.zeros(7, np.float32)
-    fill_imu(state_of(**values), 0, out)
+    fill_imu(state_of(**{"lane": -1} | values), town_lanes(), 0, out)
     return out
 
 
@@ -47,6 +56,34 @@ def test_a_right_turn_pulls_to_the_right_by_speed_times_yaw_rate():
     assert out[0] == pytest.approx(2.0, abs=0.01)
     assert out[1] == pytest.approx(5.0, abs=0.01)
     assert out[5] == pytest.approx(0.5, abs=0.01)
+
+
+def ramp():
+    """The lane of the town that rises most, how much, and where: station, yaw."""
+    lanes = town_lanes()
+    rise = np.diff(lanes.points[:, 2]) / np.repeat(lanes.spacing_m, lanes.count)[:-1]
+    rise[lanes.point_lane[1:] != lanes.point_lane[:-1]] = 0.0
+    rise[lanes.kind[lanes.point_lane[1:]] != LaneKind.DRIVING] = 0.0
+    point = int(rise.argmax())
+    lane = int(lanes.point_lane[point])
+    station = (point + 0.5 - lanes.first[lane]) * lanes.spacing_m[lane]
+    return lane, float(rise[point]), float(station), float(lanes.points[point, 3])
+
+
+@pytest.mark.parametrize(
+    ("turn", "ahead", "right"),
+    [(0.0, 1.0, 0.0), (math.pi, -1.0, 0.0), (math.pi / 2, 0.0, -1.0), (-math.pi / 2, 0.0, 1.0)],
+)
+def test_on_a_ramp_a_part_of_gravity_lies_along_the_road(turn, ahead, right):
+    """At rest the reading points straight up: uphill, to whichever side of the car that is."""
+    lane, rise, station, yaw = ramp()
+    assert rise > 0.03
+    out = imu(lane=lane, lane_m=station, yaw=yaw + turn)
+    pitch = math.atan(rise)
+    assert out[0] == pytest.approx(9.81 * math.sin(pitch) * ahead, abs=0.01)
+    assert out[1] == pytest.approx(9.81 * math.sin(pitch) * right, abs=0.01)
+    assert out[2] == pytest.approx(9.81 * math.cos(pitch), abs=0.07)
+    assert np.linalg.norm(out[:3]) == pytest.approx(9.81, abs=0.07)  # four times the noise
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
-from PIL import ImageColor
+from PIL import Image, ImageColor
 
 import di_envs
 from di_envs.drawing import EGO, LAND, LIGHT, ROUTE, box, stop_line_colours, stop_line_ends
@@ -17,6 +17,7 @@ from di_envs.map_tiles import TILE_PX, MapTiles
 from di_envs.prompt_text import prompt_in_words, where
 from di_envs.render import HEIGHT_PX, MAP_PX, PIXELS_A_METRE, WIDTH_PX, Renderer
 from di_envs.route_env import RouteEnv
+from di_envs.town.loading import load_town
 from di_envs.vector_env import RouteVectorEnv
 
 GO = np.array([0.7, 0.0, 0.0], np.float32)
@@ -143,8 +144,6 @@ def test_a_picture_of_an_observation_is_the_one_that_render_gives():
 
 
 def test_tiles_meet_without_a_seam(env):
-    from PIL import Image
-
     env.reset(seed=1)
     tiles = MapTiles(env.view.town, 4.0)
     whole = Image.new("RGB", (2 * TILE_PX, TILE_PX))
@@ -156,9 +155,28 @@ def test_tiles_meet_without_a_seam(env):
     assert len(np.unique(np.array(whole).reshape(-1, 3), axis=0)) > 3
 
 
-def test_beyond_the_town_there_is_land(env):
-    from PIL import Image
+def test_between_the_lanes_of_a_junction_there_is_road():
+    """Straight ahead of every stop line, across its width: where turns part, no land shows."""
+    town = load_town("town05")
+    scale, signals = 4.0, town.signals
+    tiles = MapTiles(town, scale)
+    level = signals.stop_pose[:, 2] < 1.0
+    assert level.sum() > 100
+    for (x, y, _, yaw), width in zip(
+        signals.stop_pose[level], signals.stop_width_m[level], strict=True
+    ):
+        left, top = int(x * scale) - 60, int(y * scale) - 60
+        picture = Image.new("RGB", (120, 120))
+        tiles.paste(picture, left, top, above=False)
+        colours = np.array(picture)
+        for ahead in (1.0, 2.0, 4.0, 6.0):
+            for right in np.linspace(-0.45, 0.45, 7) * width:
+                column = (x + ahead * np.cos(yaw) - right * np.sin(yaw)) * scale - left
+                row = (y + ahead * np.sin(yaw) + right * np.cos(yaw)) * scale - top
+                assert not near(colours[int(row), int(column)], LAND, by=8), (x, y)
 
+
+def test_beyond_the_town_there_is_land(env):
     env.reset(seed=1)
     tiles = MapTiles(env.view.town, 2.0)
     picture = Image.new("RGB", (50, 50))

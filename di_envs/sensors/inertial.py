@@ -14,6 +14,7 @@ import math
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, normal
+from di_envs.town.queries import pose_at
 
 GRAVITY_MPS2 = 9.81
 ACCELERATION_NOISE_MPS2 = (0.001, 0.001, 0.015)
@@ -24,22 +25,45 @@ IMU_LIMIT = 99.9  # CARLA's, for accelerations [m/s2] and rates [rad/s]
 
 _IMU, _GNSS = int(Stream.IMU), int(Stream.GNSS)
 _CHANNELS = 8  # keys kept apart for each ego; an IMU draws six
+_AXLE_M = 1.4  # from the ego's centre to its axles, between which the road's slope is taken
 
 
 @kernel
-def fill_imu(state, ego, out):
+def slope_below(state, lanes, ego):
+    """Rise of the road below an ego, ahead and to the right, in metres a metre; 0 off the lanes.
+
+    A lane rises along itself and is level across.
+    """
+    lane = state.lane[ego]
+    if lane < 0:
+        return 0.0, 0.0
+    behind = max(0.0, state.lane_m[ego] - _AXLE_M)
+    ahead = min(lanes.length_m[lane], state.lane_m[ego] + _AXLE_M)
+    if ahead - behind < _AXLE_M:
+        return 0.0, 0.0
+    rise = (pose_at(lanes, lane, ahead)[2] - pose_at(lanes, lane, behind)[2]) / (ahead - behind)
+    turn = pose_at(lanes, lane, state.lane_m[ego])[3] - state.yaw[ego]
+    return rise * math.cos(turn), rise * math.sin(turn)
+
+
+@kernel
+def fill_imu(state, lanes, ego, out):
     """Writes accelerations [m/s2], angular rates [rad/s] and the compass [rad], CARLA's order.
 
-    The road is taken as level: the ego has no pitch or roll, and z shows gravity alone.
+    As an accelerometer does, it shows gravity: at rest on a level road 9.81 upwards, on a slope a
+    part of it along the road. The rates are those of a level road: pitching is left out.
 
     Args:
         state: `State` of the world.
+        lanes: `Lanes` of the town.
         ego: The ego's index.
         out: (7,) ax, ay, az, gx, gy, gz, compass in [0, 2 pi).
     """
-    out[0] = state.acceleration[ego]
-    out[1] = state.speed[ego] * state.yaw_rate[ego]
-    out[2] = GRAVITY_MPS2
+    rise_x, rise_y = slope_below(state, lanes, ego)
+    upright = GRAVITY_MPS2 / math.sqrt(1.0 + rise_x * rise_x + rise_y * rise_y)
+    out[0] = state.acceleration[ego] + rise_x * upright
+    out[1] = state.speed[ego] * state.yaw_rate[ego] + rise_y * upright
+    out[2] = upright
     out[3] = 0.0
     out[4] = 0.0
     out[5] = state.yaw_rate[ego]

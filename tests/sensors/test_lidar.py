@@ -223,14 +223,20 @@ def test_drops_depend_on_tick_and_seed_alone(town):
 
 @pytest.mark.parametrize("number", range(4))
 def test_hits_agree_with_the_depth_and_tags_that_the_camera_shows(busy, number):
-    """At four places of a busy town, in four cameras of 90 degrees where the LiDAR is."""
+    """At four places of a busy town: a point's own pixel shows its tag, and its depth within 2 %.
+
+    A camera looks through the middle of a pixel and the ray passes beside it, so at silhouettes
+    they may meet different things. Pixels are small here, so these are few; and they all lie at
+    silhouettes: some pixel beside shows what the ray met.
+    """
     traffic = np.flatnonzero(busy.view.state.kind[: 1 + 120])
     state, actor = busy.view.state, traffic[7 + 23 * number]
     pose = (state.x[actor], state.y[actor], state.z[actor] + 1.5, state.yaw[actor])
     place(busy, 0, *pose)
     points, tags = sweep(busy, channels=32, steps=720, x_m=0.0, semantic=True, **SURE)
+    side = 2000
     cameras = tuple(
-        CameraConfig(name=f"camera_{k}", width=640, height=640, fov_deg=90.0, x_m=0.0, z_m=2.5,
+        CameraConfig(name=f"camera_{k}", width=side, height=side, fov_deg=90.0, x_m=0.0, z_m=2.5,
                      yaw_rad=k * math.pi / 2.0)
         for k in range(4)
     )  # fmt: skip
@@ -240,23 +246,22 @@ def test_hits_agree_with_the_depth_and_tags_that_the_camera_shows(busy, number):
     rig.start(busy.view)
     images = rig.observe()
     hit = points[..., 3] > 0.0
-    close, same, total = 0, 0, 0
+    close, same, beside, total = 0, 0, 0, 0
     for camera in cameras:
         column, row, depth = camera.project(points[hit][:, :3]).T
-        seen = (depth > 0.5) & (column >= 1) & (column < 639) & (row >= 1) & (row < 639)
-        i, j = row[seen].astype(int), column[seen].astype(int)
+        inside = (np.minimum(column, row) >= 1) & (np.maximum(column, row) < side - 1)
+        seen = (depth > 0.5) & inside
+        i, j, met = row[seen].astype(int), column[seen].astype(int), tags[hit][seen]
+        shown = images[f"{camera.name}_semantic"]
         total += seen.sum()
-        # a point may fall on the last pixel before an edge: any of its neighbours will do
-        near, tag = np.zeros(len(i), bool), np.zeros(len(i), bool)
-        for di in (-1, 0, 1):
-            for dj in (-1, 0, 1):
-                there = images[f"{camera.name}_depth"][i + di, j + dj]
-                near |= np.abs(there - depth[seen]) <= 0.02 * depth[seen]
-                tag |= images[f"{camera.name}_semantic"][i + di, j + dj] == tags[hit][seen]
-        close, same = close + near.sum(), same + tag.sum()
+        near = np.abs(images[f"{camera.name}_depth"][i, j] - depth[seen]) <= 0.02 * depth[seen]
+        close, same = close + near.sum(), same + (shown[i, j] == met).sum()
+        round_it = [shown[i + di, j + dj] == met for di in (-1, 0, 1) for dj in (-1, 0, 1)]
+        beside += np.any(round_it, axis=0).sum()
     assert total > 5000
-    assert close / total >= 0.99
     assert same / total >= 0.99
+    assert close / total >= 0.99
+    assert beside / total >= 0.999
 
 
 def test_each_tick_scans_the_half_of_the_sweep_that_is_its_turn(busy):
