@@ -1,17 +1,23 @@
 # mypy: disallow_untyped_defs=False
-"""Everybody else, seen from the expert's path: leaders, gaps, walkers, as kernels."""
+"""Everybody else, seen from the expert's path: leaders and gaps, as kernels."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from agents.expert_line import height_at, project
 from agents.expert_path import STEP_M
-from agents.expert_speed import NO_LIMIT_MPS2, follow, stop_within, time_to
+from agents.expert_people import SPARE_S, is_on_foot, note_person
+from agents.expert_sight import (
+    BEST,
+    FRONT_OK,
+    INSIDE_M,
+    LEADER_REAR,
+    LEADER_SPEED,
+    REAR_OK,
+    ROOM_M,
+)
+from agents.expert_speed import follow
 from di_envs.geometry import wrap_angle
 from di_envs.kernels import kernel
 from di_envs.world.state import ActorKind
@@ -21,40 +27,13 @@ LOOK_M, LOOK_S = 35.0, 4.0  # others are looked at within this and the way drive
 BACK_M = 60.0  # of path behind the car, where followers are
 CROSSING_RAD = 0.6  # whoever stands at more than this angle to the path crosses it
 LEADER_BRAKING_MPS2 = 8.0  # what the vehicle ahead may do
-AHEAD_OF_WALKER_S = 1.2  # by which the car is gone before a walker steps onto its path
-SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
-WALKER_LOOK_S = 6.0
 BLOCKED_GAP_M = 1.5
 PULL_OUT_M = 4.5  # behind a leader, that a change to the next lane takes from standstill
 PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
-FAR_M = 1e6
 
-_ABSENT, _WALKER, _PROP, _DEBRIS = (
-    int(kind) for kind in (ActorKind.ABSENT, ActorKind.WALKER, ActorKind.PROP, ActorKind.DEBRIS)
+_ABSENT, _PROP, _DEBRIS = (
+    int(kind) for kind in (ActorKind.ABSENT, ActorKind.PROP, ActorKind.DEBRIS)
 )
-
-
-class Sight(NamedTuple):
-    """What `look` finds: numbers by their place in `number`, and those who cross."""
-
-    number: NDArray[np.float64]  # (7,) see the constants below
-    holder: NDArray[np.int32]  # (32,) vehicles with a grant for a junction near
-    holders: NDArray[np.int32]  # (1,) how many
-
-
-BEST, LEADER_REAR, LEADER_SPEED, FRONT_OK, REAR_OK, INSIDE_M, ROOM_M = range(7)
-
-
-@kernel
-def blank_sight():
-    """Room for what `look` finds; nothing seen yet."""
-    number = np.zeros(7)
-    number[BEST] = NO_LIMIT_MPS2
-    number[LEADER_REAR] = FAR_M
-    number[FRONT_OK] = 1.0
-    number[REAR_OK] = 1.0
-    number[ROOM_M] = FAR_M
-    return Sight(number, np.zeros(32, np.int32), np.zeros(1, np.int32))
 
 
 @kernel
@@ -130,34 +109,6 @@ def _note_gap(sight, actors, ego, rear, front, along, progress, numbers):
 
 
 @kernel
-def _note_walker(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
-    """Stops before a walker who is on the path, or will be when the car is there."""
-    across = actors.speed[actor] * math.sin(turn)
-    along = actors.speed[actor] * math.cos(turn)
-    half, body = actors.half_length[ego], actors.half_length[actor]
-    reach = actors.half_width[ego] + body + numbers.walker_margin_m
-    enters, leaves = 0.0, WALKER_LOOK_S
-    if abs(across) > 0.2:
-        towards = -math.copysign(offset, offset * across)  # positive while coming nearer
-        enters = max((towards - reach) / abs(across), 0.0)
-        leaves = (towards + reach) / abs(across)
-    if (abs(offset) >= reach and abs(across) <= 0.2) or leaves <= 0.0 or enters > WALKER_LOOK_S:
-        return
-    meeting = station + along * min(enters, 2.0)
-    distance = meeting - body - progress.station_m - half
-    if distance < 0.0 and abs(offset) > actors.half_width[ego] + body:
-        return  # beside the car: it only gets out of that walker's way by going on
-    if station + body < progress.station_m:
-        return
-    arrives = time_to(times, distance - 0.5)
-    gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
-    if arrives > leaves + SPARE_S or gone + AHEAD_OF_WALKER_S < enters:
-        return
-    stop = stop_within(distance - numbers.walker_gap_m, actors.speed[ego], numbers)
-    sight.number[BEST] = min(sight.number[BEST], stop)
-
-
-@kernel
 def look(sight, path, progress, actors, ways, ego, shift, span, junction, times, numbers):
     """Looks at all actors near the car.
 
@@ -185,8 +136,8 @@ def look(sight, path, progress, actors, ways, ego, shift, span, junction, times,
         if abs(actors.z[actor] - height_at(path, station)) > LEVEL_M:
             continue
         turn = wrap_angle(actors.yaw[actor] - yaw)
-        if kind == _WALKER:
-            _note_walker(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
+        if is_on_foot(actors, actor):
+            note_person(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
             continue
         _note_vehicle(
             sight, actors, actor, ego, station, offset, turn, progress, shift, span, numbers

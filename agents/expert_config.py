@@ -22,6 +22,7 @@ class ExpertNumbers(NamedTuple):
     red_margin_s: float
     walker_margin_m: float
     walker_gap_m: float
+    wary_mps: float
     exit_gap_m: float
     clear_before_s: float
     clear_after_s: float
@@ -50,6 +51,7 @@ class ExpertConfig:
     red_margin_s: float = 0.4  # the tail is over the line this long before red
     walker_margin_m: float = 0.7  # added to each side of the car for walkers
     walker_gap_m: float = 2.5  # between the front and a walker
+    wary_mps: float = 9.0  # where the plan says that somebody hides beside the road
     exit_gap_m: float = 2.0  # room kept free behind those beyond a junction
     clear_before_s: float = 0.4  # another has left a crossing this long before the expert comes
     clear_after_s: float = 1.2  # the expert has left it this long before another comes

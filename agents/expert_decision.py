@@ -5,20 +5,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.expert_actors import (
+from agents.expert_actors import look
+from agents.expert_control import pedals, steering
+from agents.expert_junction import crossing_acceleration, exit_acceleration, junction_ahead
+from agents.expert_line import Progress, localise
+from agents.expert_path import CHANGE_END_M, CHANGE_ROOM_M
+from agents.expert_rules import line_acceleration, next_line, stops_here
+from agents.expert_sight import (
     BEST,
     FRONT_OK,
     LEADER_REAR,
     LEADER_SPEED,
     REAR_OK,
     blank_sight,
-    look,
 )
-from agents.expert_control import pedals, steering
-from agents.expert_junction import crossing_acceleration, exit_acceleration, junction_ahead
-from agents.expert_line import Progress, localise
-from agents.expert_path import CHANGE_END_M, CHANGE_ROOM_M
-from agents.expert_rules import line_acceleration, next_line, stops_here
 from agents.expert_speed import cruise, forecast, stop_within
 from di_envs.kernels import kernel
 

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from agents.expert_actors import INSIDE_M, ROOM_M
 from agents.expert_rules import PAST_LINE_M
+from agents.expert_sight import INSIDE_M, ROOM_M
 from agents.expert_speed import (
     NO_LIMIT_MPS2,
     braking_needed,

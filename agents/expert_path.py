@@ -29,6 +29,8 @@ WANTED_ROOM_M = 35.0  # for a lane change; late ones are begun earlier than the 
 CHANGE_ROOM_M = 12.0  # shortest lane change
 BEHIND_START_M = 5.0  # a stop line this far behind the start is still below the tail
 CHANGE_END_M = 2.0  # lane changes end this far before the room for them does
+WARY_BEFORE_M, WARY_BEHIND_M = 3.0, 17.0  # of a trigger of scenario 3, where somebody may step out
+STEPS_OUT = 3  # its number
 
 
 class DrivePath(NamedTuple):
@@ -98,7 +100,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
         z=z,
         yaw=yaw,
         curvature=curvature,
-        speed_mps=_speeds(curvature, legs_array, lanes, config),
+        speed_mps=_speeds(_wary(plan, x, y, z, yaw, config), curvature, legs_array, lanes, config),
         leg_lane=leg_lane,
         leg_junction=lanes.junction[leg_lane].astype(np.int32),
         leg_begin_m=legs_array[:, 1].copy(),
@@ -326,15 +328,42 @@ def _curvature(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(slope)
 
 
+def _wary(
+    plan: RoutePlan,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    z: NDArray[np.float64],
+    yaw: NDArray[np.float64],
+    config: ExpertConfig,
+) -> NDArray[np.float64]:
+    """Speeds where the plan says that somebody hides beside the road; else infinite."""
+    speed = np.full(x.size, np.inf)
+    past = 0
+    for trigger in plan.scenarios:
+        if trigger.type != STEPS_OUT:
+            continue
+        at = plan.points[trigger.point]
+        away = (x - at[0]) ** 2 + (y - at[1]) ** 2 + (z - at[2]) ** 2
+        away[np.cos(yaw - at[3]) < 0.5] = np.inf  # the path may cross itself there
+        past += int(np.argmin(away[past:]))
+        begin = max(past - int(WARY_BEFORE_M / STEP_M), 0)
+        speed[begin : past + int(WARY_BEHIND_M / STEP_M)] = config.wary_mps
+    return speed
+
+
 def _speeds(
-    curvature: NDArray[np.float64], legs: NDArray[np.float64], lanes: Lanes, config: ExpertConfig
+    wary: NDArray[np.float64],
+    curvature: NDArray[np.float64],
+    legs: NDArray[np.float64],
+    lanes: Lanes,
+    config: ExpertConfig,
 ) -> NDArray[np.float64]:
     """Speed limit and cornering speed, lowered where braking for what comes needs it."""
     station = np.arange(curvature.size) * STEP_M
     leg = np.clip(np.searchsorted(legs[:, 1], station, side="right") - 1, 0, len(legs) - 1)
     limit = lanes.speed_limit_mps[legs[leg, 0].astype(np.int64)] * config.limit_factor
     corner = np.sqrt(config.lateral_mps2 / np.maximum(np.abs(curvature), 1e-4))
-    speed = np.minimum(limit, corner)
+    speed = np.minimum(np.minimum(limit, corner), wary)
     for i in range(speed.size - 2, -1, -1):
         reachable = np.sqrt(speed[i + 1] ** 2 + 2.0 * config.corner_braking_mps2 * STEP_M)
         speed[i] = min(speed[i], reachable)

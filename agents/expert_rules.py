@@ -7,6 +7,8 @@ from agents.expert_speed import NO_LIMIT_MPS2, braking_needed, stop_within, time
 from di_envs.kernels import kernel
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
+from di_envs.world.scenario_lights import NEAR_M
+from di_envs.world.scenario_lights import YELLOW_TICKS as SHORT_YELLOW_TICKS
 from di_envs.world.state import TICK_S
 
 TAIL_M = 1.3  # the red-light rule looks 1 m behind the bumper
@@ -16,6 +18,9 @@ LOOK_M = 120.0
 QUEUE_S = 8.0  # of green and yellow left, below which a queue ahead is not followed over the line
 QUEUE_BRAKING_MPS2 = 4.0  # with which those ahead may stop
 NEVER_S = 1e6
+LASTING_S = 1000.0  # a light that stays green for longer is held by a scenario, …
+HELD_UNTIL_M = NEAR_M  # … until the car is so near
+DECISION_M = 1.5  # that the car may go on before that is seen
 TAIL_FROM = 0.8  # the rule's tail begins this many half lengths behind the centre
 TAIL_MARGIN_M = 0.1
 CRAWLING_MPS = 3.0
@@ -36,6 +41,18 @@ def seconds_to_red(lights, signal):
 
 
 @kernel
+def _green_held_s(left, times, line_ahead_m):
+    """How long a green that a scenario holds lasts: a short yellow follows once the car is near.
+
+    Nearer than that and still green, it stays so until the car has left the junction.
+    """
+    near = line_ahead_m - HELD_UNTIL_M
+    if left < LASTING_S or near < -DECISION_M:
+        return left
+    return time_to(times, near) + SHORT_YELLOW_TICKS * TICK_S
+
+
+@kernel
 def light_acceleration(
     lights, signal, line_m, station_m, half_length, speed, times, queue, numbers
 ):
@@ -47,7 +64,7 @@ def light_acceleration(
         times: From `forecast`.
         queue: (station of the rear, speed) of the vehicle ahead, which the car cannot overtake.
     """
-    left = seconds_to_red(lights, signal)
+    left = _green_held_s(seconds_to_red(lights, signal), times, line_m - station_m)
     distance = line_m - station_m - half_length
     over = line_m + TAIL_M + half_length  # where the centre is once the tail is over
     if distance < -PAST_LINE_M:

@@ -35,6 +35,7 @@ class Actors(NamedTuple):
     previous_lane: Int
     changing_from: Int
     grant: Int
+    walk_edge: Int
 
 
 class Ways(NamedTuple):

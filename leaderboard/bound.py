@@ -4,12 +4,15 @@ On a short route a red light or two can eat the whole time allowed, so that nobo
 Tables print this bound beside an agent's score to tell the two apart. The driver is a point mass on
 the route at the speed limit, held back by curves, stop signs and the world's own lights for the
 seed, with nobody else on the road; it commits no infraction, so its DS is its RC.
+
+It goes through yellow where its tail is over the line before red, as the rules let it. Scenarios 7
+to 9 change the lights by where it is; nobody gains by coming later, as every step of theirs begins
+once the ego is near enough. Those who cross in scenarios 3 and 4 do not hold it back.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +23,8 @@ from di_envs.town.lanes import LightState, SignalKind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.dynamics import EgoModel
-from di_envs.world.lights import advance_lights, start_lights
-from di_envs.world.state import TICK_S, Capacity, State, state_dtype, views_of
+from di_envs.world.state import TICK_S
+from leaderboard.quiet_world import QuietWorld
 from leaderboard.record import Bound
 
 Float64 = NDArray[np.float64]
@@ -29,6 +32,7 @@ Float64 = NDArray[np.float64]
 # Leaderboard 1.0: a route is completed beyond 99 % of it and within 10 m of its last point
 COMPLETE_SHARE = 0.99
 COMPLETE_WITHIN_M = 10.0
+LONGEST_YELLOW_S = 3.5  # further ahead than that, arrivals are not of interest
 CURVE_SPAN_M = 4.0  # a bend is measured over this much route, so that a kink is not a curve
 
 
@@ -42,6 +46,7 @@ class PerfectDriver:
     nose_m: float = (
         EgoModel().half_length_m
     )  # from the route position to the bumper that stays behind stop lines
+    tail_m: float = EgoModel().half_length_m + 1.0  # and back to where the red-light rule looks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,34 +64,7 @@ def light_limited_bound(
     driver = driver or PerfectDriver()
     route_m, allowed = speed_profile(plan, town.lanes.speed_limit_mps[plan.lane], driver)
     stops = stop_points(town, plan, driver)
-    lights = light_schedule(town, world_seed)
-    return _drive(plan, (route_m, allowed), stops, lights, driver)
-
-
-def light_schedule(town: Town, world_seed: int) -> Iterator[NDArray[np.int8]]:
-    """What each signal head (S,) shows at tick 0, 1, …: the world's own lights and no traffic.
-
-    The array is the same object at every tick.
-    """
-    state = _empty_state(town, world_seed)
-    start_lights(state, town.signals)
-    while True:
-        yield state.light
-        advance_lights(state, town.signals)
-
-
-def _empty_state(town: Town, world_seed: int) -> State:
-    capacity = Capacity(
-        egos=1,
-        vehicles=0,
-        walkers=0,
-        props=0,
-        junctions=town.signals.groups.size,
-        signals=town.signals.kind.size,
-    )
-    state = views_of(np.zeros(1, state_dtype(capacity)))
-    state.seed[()] = world_seed
-    return state
+    return _drive(plan, (route_m, allowed), stops, QuietWorld(town, plan, world_seed), driver)
 
 
 def stop_points(town: Town, plan: RoutePlan, driver: PerfectDriver) -> list[StopPoint]:
@@ -143,7 +121,7 @@ def _drive(
     plan: RoutePlan,
     profile: tuple[Float64, Float64],
     stops: list[StopPoint],
-    lights: Iterator[NDArray[np.int8]],
+    world: QuietWorld,
     driver: PerfectDriver,
 ) -> Bound:
     """Advances the point mass tick by tick until the route is completed or times out."""
@@ -152,7 +130,6 @@ def _drive(
     done_m, speed, ahead, stood = 0.0, 0.0, 0, 0
     table = _Ahead(profile)
     for tick in range(round(plan.timeout_s / TICK_S) + 1):  # the world ends it once it is over
-        colours = next(lights)
         while ahead < len(stops) and done_m > stops[ahead].route_m + 0.5:
             ahead += 1
         target = min(speed + driver.acceleration_mps2 * TICK_S, table.allowed(done_m))
@@ -160,11 +137,12 @@ def _drive(
             gap_m = stops[ahead].route_m - done_m
             if stops[ahead].light < 0 and gap_m < 0.2 and speed < 0.1:
                 ahead += 1  # stopped for the sign: one tick is enough
-            elif _must_stop(stops[ahead], gap_m, speed, colours, driver):
+            elif _must_stop(stops[ahead], gap_m, speed, world, table, driver):
                 target = min(target, _speed_before(gap_m, driver))
         target = max(target, speed - 2.0 * driver.braking_mps2 * TICK_S, 0.0)
         done_m += 0.5 * (speed + target) * TICK_S
         speed = target
+        world.advance(done_m)
         stood += speed < 0.1
         if done_m > goal_m:
             finish_s = (tick + 1) * TICK_S
@@ -182,21 +160,50 @@ class _Ahead:
         self._index = 0
 
     def allowed(self, done_m: float) -> float:
+        self._index = self._after(done_m, self._index)
+        return self._allowed_at(self._index)
+
+    def beyond_s(self, ahead_m: float, done_m: float, speed: float, gain_mps2: float) -> float:
+        """Time to go `ahead_m` from a place and a speed, as fast as the profile lets it."""
+        seconds, goal_m, index = 0.0, done_m + ahead_m, self._index
+        while done_m < goal_m and seconds < LONGEST_YELLOW_S:
+            index = self._after(done_m, index)
+            faster = min(speed + gain_mps2 * TICK_S, max(self._allowed_at(index), 0.1))
+            done_m += 0.5 * (speed + faster) * TICK_S
+            speed, seconds = faster, seconds + TICK_S
+        return seconds
+
+    def _after(self, done_m: float, index: int) -> int:
         last = len(self._route_m) - 1
-        while self._index < last and self._route_m[self._index + 1] <= done_m:
-            self._index += 1
-        return float(self._allowed[min(self._index + 1, last)])
+        while index < last and self._route_m[index + 1] <= done_m:
+            index += 1
+        return index
+
+    def _allowed_at(self, index: int) -> float:
+        return float(self._allowed[min(index + 1, len(self._allowed) - 1)])
 
 
 def _must_stop(
-    stop: StopPoint, gap_m: float, speed: float, colours: NDArray[np.int8], driver: PerfectDriver
+    stop: StopPoint,
+    gap_m: float,
+    speed: float,
+    world: QuietWorld,
+    table: _Ahead,
+    driver: PerfectDriver,
 ) -> bool:
-    """Whether to stop there: at signs always, at lights unless green or too late to brake."""
+    """Whether to stop there: at signs always, at red, and at yellow that is too short."""
     if stop.light < 0:
         return True
-    if colours[stop.light] in (LightState.GREEN, LightState.NONE):
+    colour = world.light[stop.light]
+    if colour in (LightState.GREEN, LightState.NONE):
         return False
-    return speed * speed / (2.0 * driver.braking_mps2) <= gap_m + 0.5
+    if speed * speed / (2.0 * driver.braking_mps2) > gap_m + 0.5:
+        return False  # too late to brake
+    if colour == LightState.RED:
+        return True
+    over_m = gap_m + driver.nose_m + driver.tail_m
+    over_s = table.beyond_s(over_m, stop.route_m - gap_m, speed, driver.acceleration_mps2)
+    return over_s > world.yellow_left_s(stop.light)
 
 
 def _speed_before(gap_m: float, driver: PerfectDriver) -> float:

@@ -6,6 +6,7 @@ what it had driven by then still counts, as in CARLA.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 import warnings
@@ -122,12 +123,17 @@ def extra_keys(requires: Requirements, view: WorldView) -> dict[str, Any]:
     return extras
 
 
+def plan_shown(requires: Requirements, plan: RoutePlan) -> RoutePlan:
+    """The plan as an agent gets it: only privileged ones learn where scenarios begin."""
+    return plan if requires.privileged else dataclasses.replace(plan, scenarios=())
+
+
 def _start(
     new_agent: Callable[[], Agent[Any]], plan: RoutePlan, job: Job
 ) -> tuple[Agent[Any], Any]:
     try:
         agent = new_agent()
-        return agent, agent.start(plan, job.world_seed)
+        return agent, agent.start(plan_shown(agent.requires, plan), job.world_seed)
     except SensorSuiteError as error:
         raise FaultError(SENSORS_INVALID, str(error)) from error
     except (Exception, SystemExit) as error:

@@ -15,7 +15,7 @@ from agents import load_agent
 from leaderboard.bound import light_limited_bound
 from leaderboard.compiling import compile_progress
 from leaderboard.driver import Driver
-from leaderboard.episode import extra_keys
+from leaderboard.episode import extra_keys, plan_shown
 from leaderboard.jobs import RunSpec
 from leaderboard.messages import Scene
 from leaderboard.setting_up import scene_of, set_up
@@ -43,7 +43,7 @@ def _drive_a_little(spec: RunSpec, driver: Driver) -> None:
     observation = driver.env.observe()
     with suppress(Exception, SystemExit):
         agent = load_agent(spec.agent)
-        memory = agent.start(view.plans[view.ego], 0)
+        memory = agent.start(plan_shown(agent.requires, view.plans[view.ego]), 0)
         agent.act({**observation, **extra_keys(agent.requires, view)}, memory)
         agent.close()
     for _ in range(WARM_UP_STEPS):

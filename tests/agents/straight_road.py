@@ -110,6 +110,7 @@ def make_actors(others: int = 0) -> Actors:
         previous_lane=np.full(count, -1, np.int32),
         changing_from=np.full(count, -1, np.int32),
         grant=np.full(count, -1, np.int32),
+        walk_edge=np.full(count, -1, np.int32),
     )
 
 

@@ -59,7 +59,8 @@ def test_it_completes_every_toy_route_in_traffic_without_an_infraction(
     world = World(town, WorldConfig(vehicles=8, walkers=6))
     for plan in plans:
         events, _ = drive(world, Expert(), plan)
-        assert [event.kind for event in events] == [EventKind.COMPLETED]
+        kinds = [event.kind for event in events if event.kind is not EventKind.MIN_SPEED]
+        assert kinds == [EventKind.COMPLETED]  # how slow it was is measured, no infraction in 1.0
 
 
 def test_in_turns_it_stays_within_thirty_centimetres_of_its_path(
