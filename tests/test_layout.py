@@ -90,6 +90,8 @@ def test_no_module_knows_an_absolute_path(path):
 def test_no_module_asks_environment_variables(path):
     if path == TOP / "di_envs" / "kernels.py":
         pytest.skip("Numba is told by one, before it loads, to keep bits equal everywhere")
+    if path == TOP / "leaderboard" / "ray_engine.py":
+        pytest.skip("Ray is told by one, before it loads, to report nobody's usage")
     for node in ast.walk(parsed(path)):
         name = dotted(node)
         if name in ("os.environ", "os.getenv", "os.environ.get"):

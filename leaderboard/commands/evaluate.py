@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -42,6 +42,12 @@ class Evaluate(SceneArguments):
     workers: Annotated[int, says("N", "1")] = 1
     """Processes to drive in; the results are the same bits for any number."""
 
+    engine: Annotated[Literal["local", "ray"], says("local|ray", "local")] = "local"
+    """Where: on this machine, or on a Ray cluster (needs driveinsight[ray]); the same bits."""
+
+    address: Annotated[str | None, says("ADDRESS", "a cluster of this machine alone")] = None
+    """With --engine ray: a running cluster, such as `auto` or ray://head:10001."""
+
     route_ids: Annotated[tuple[str, ...], says("ID ...", "all")] = ()
     """Drive these routes only."""
 
@@ -70,6 +76,8 @@ class Evaluate(SceneArguments):
             raise UsageError("--seeds and --workers must be at least 1")
         if self.overwrite and self.resume:
             raise UsageError("--overwrite and --resume exclude each other: choose one")
+        if self.address and self.engine != "ray":
+            raise UsageError("--address is of a Ray cluster: add --engine ray")
         options, suite = self.choose(self.route_ids)
         folder = self.output or self._default_folder(suite.name)
 
@@ -106,7 +114,11 @@ class Evaluate(SceneArguments):
             )
         except ValueError as error:
             raise UsageError(str(error)) from error
-        return LocalEngine(workers=self.workers, limits=limits)
+        if self.engine == "local":
+            return LocalEngine(workers=self.workers, limits=limits)
+        from leaderboard.ray_engine import RayEngine
+
+        return RayEngine(workers=self.workers, limits=limits, address=self.address)
 
     def _existing(self) -> Existing:
         from leaderboard.runner import Existing

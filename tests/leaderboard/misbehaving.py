@@ -188,12 +188,26 @@ class KillsItsWorker(_OnSeedTwo):
 
 
 class KillsItsWorkerOnce(_OnSeedTwo):
-    """A fault that comes and goes, as of a machine: the file beside this one remembers it."""
+    """A fault that comes and goes, as of a machine: a file beside this one remembers it."""
 
     def misbehave(self) -> Any:
-        mark = Path("killed-once")  # in the working folder, which is the test's
-        if mark.exists():
-            return BRAKE
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
+        if _first_time("worker-killed"):
+            os.kill(os.getpid(), signal.SIGKILL)
         return BRAKE
+
+
+class KillsItsParentThenItself(_OnSeedTwo):
+    """The same for an actor of Ray's, which is what holds a worker there."""
+
+    def misbehave(self) -> Any:
+        if _first_time("parent-killed"):
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(FOR_EVER_S)
+        return BRAKE
+
+
+def _first_time(name: str) -> bool:
+    mark = Path(__file__).with_name(name)
+    known = mark.exists()
+    mark.touch()
+    return not known

@@ -58,8 +58,9 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.6, 0.9])
-def test_killed_with_all_its_workers_and_resumed_a_run_is_identical(share, tmp_path):
+def test_killed_with_all_its_workers_and_resumed_a_run_is_identical(share, whole, tmp_path):
     """`benchmarks/kill_and_resume.py` does this at as many random moments as one likes."""
+    assert whole.is_dir()  # so all is compiled, and the next run is as long as any
     whole_s = finish(tmp_path / "whole")
     kept = start_and_kill(tmp_path / "killed", share * whole_s)
     finish(tmp_path / "killed", "--resume")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import signal
 from collections import deque
 from collections.abc import Sequence
@@ -167,9 +168,9 @@ def test_a_worker_that_is_always_killed_loses_its_own_route_and_no_other(tmp_pat
     assert json.loads((tmp_path / CARLA_FILE).read_text())["eligible"] is False
 
 
-def test_a_worker_killed_once_costs_nothing(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    spec = misbehaving("KillsItsWorkerOnce")
+def test_a_worker_killed_once_costs_nothing(tmp_path):
+    agents = shutil.copy(MISBEHAVING, tmp_path)  # it leaves a file beside it
+    spec = RunSpec(agent=f"{agents}:KillsItsWorkerOnce", options=QUIET)
     run = evaluated(spec, [1, 2, 3], tmp_path / "run")
     assert [record.lost for record in run.routes] == [False, False, False]
     here = [record.fingerprint() for record in driven(spec, [1, 2, 3])]
