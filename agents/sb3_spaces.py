@@ -104,11 +104,12 @@ def _fitting(
         if not wrong:
             return option, {name: offer[name] for name in wanted}
         name = wrong[0]
-        complaint += f" {option or group}: {offer.get(name)};"
+        which = " ".join(option.values()) or group
+        complaint += f" {which}: {_described(offer.get(name))};"
     raise ValueError(
-        f"its observation '{name}' is {wanted[name]}, which none of ours is:{complaint} train it "
-        f"on an environment of this version, with a shipped rig or LiDAR, and no other wrappers "
-        f"around the observation than VectorObservations."
+        f"its observation '{name}' is {_described(wanted[name])}, which none of ours is:"
+        f"{complaint} train it on an environment of this version, with a shipped rig or LiDAR, "
+        f"and no other wrappers around the observation than VectorObservations."
     )
 
 
@@ -128,6 +129,15 @@ def _alike(wanted: spaces.Space[Any], offered: spaces.Space[Any]) -> bool:
         return False
     height, width, channels = offered.shape
     return wanted == spaces.Box(0, 255, (channels, height, width), np.uint8)
+
+
+def _described(space: spaces.Space[Any] | None) -> str:
+    """A space in few words: a table's bounds are those of its last row."""
+    if not isinstance(space, spaces.Box):
+        return str(space)
+    low, high = (bound.reshape(-1, bound.shape[-1])[-1][:12] for bound in (space.low, space.high))
+    ends = [", ".join(f"{value:.3g}" for value in bound.tolist()) for bound in (low, high)]
+    return f"{space.shape} {space.dtype}, a row from [{ends[0]}] to [{ends[1]}]"
 
 
 def _unknown(names: list[str]) -> str:

@@ -38,7 +38,7 @@ class Training:
     model: Path = Path("ppo.zip")
     """Where the model goes; the episodes' returns go beside it."""
 
-    steps: int = 400_000
+    steps: int = 300_000
     """Decisions in all worlds together."""
 
     rollout: int = 4096

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -25,6 +26,7 @@ from leaderboard.cli import Command, Evaluate
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
+AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 README = (TOP / "README.md").read_text(encoding="utf-8")
 CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
 
@@ -63,6 +65,23 @@ def test_the_readmes_python_runs(number):
         text=True,
         check=False,
         timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("number", range(len(blocks(AGENTS_PAGE, "python"))))
+def test_the_python_of_the_page_on_agents_runs(number, tmp_path):
+    code = blocks(AGENTS_PAGE, "python")[number]
+    if "stable_baselines3" in code:
+        pytest.importorskip("stable_baselines3", reason="needs the extra rl")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
 
