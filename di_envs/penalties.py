@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from types import MappingProxyType
 
 from di_envs.world.kinds import EventKind
@@ -51,11 +52,16 @@ class Penalties:
             raise ValueError(f"min_speed must be in [0, 1), not {self.min_speed}")
         object.__setattr__(self, "costs", MappingProxyType(dict(self.costs)))
 
-    @property
+    @cached_property
     def scored(self) -> tuple[EventKind, ...]:
         """The kinds that cost something each time, in the order of `EventKind`."""
         kinds = [*self.costs, *([EventKind.MIN_SPEED] if self.min_speed else [])]
         return tuple(sorted(kinds))
+
+    @cached_property
+    def no_terms(self) -> Mapping[str, float]:
+        """What the scored kinds take of a step without an infraction, by name: nothing."""
+        return MappingProxyType({kind.name.lower(): 0.0 for kind in self.scored})
 
     def infraction_score(
         self,
@@ -70,9 +76,14 @@ class Penalties:
             pace_shares: At each checkpoint the ego's share of the traffic's mean speed, 0..1.
             outside_shares: The parts of the way, 0..1, outside lanes; at most one, as a rule.
         """
-        slow = [1.0 - share for share in pace_shares if share < 1.0] if self.min_speed else []
-        costs = [cost for kind, cost in self.costs.items() for _ in range(counts[kind])]
         factors = [1.0 - share for share in outside_shares]
+        slow = [1.0 - share for share in pace_shares if share < 1.0] if self.min_speed else []
+        costs: list[float] = []
+        for kind, cost in self.costs.items():
+            if counts[kind]:
+                costs += [cost] * counts[kind]
+        if not (costs or slow or factors):
+            return 1.0
         if self.form == Form.PRODUCT:
             factors += costs + [1.0 - self.min_speed * part for part in slow]
             total = 0.0

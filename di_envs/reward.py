@@ -68,15 +68,17 @@ def reward_terms(before: Standing, after: Standing, penalties: Penalties) -> dic
         "progress": progress_m * penalty,
         "outside_lanes": (inside_m - inside_metres(before) - progress_m) * penalty,
     }
+    terms |= penalties.no_terms
+    if after.counts == before.counts:
+        return terms
     score = inside_m * penalty
     seen = before
     for kind in penalties.scored:
-        left = score
         if after.counts[kind] != before.counts[kind]:
             seen = _with_kind(seen, after, kind)
             left = inside_m * infraction_penalty(seen, penalties)
-        terms[kind.name.lower()] = left - score
-        score = left
+            terms[kind.name.lower()] = left - score
+            score = left
     return terms
 
 

@@ -13,7 +13,6 @@ hash of the run's file, so routes of two runs are never counted together.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import os
 import tempfile
@@ -22,17 +21,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from di_envs.world.state import EventKind
 from leaderboard.carla_results import carla_results
-from leaderboard.record import Bound, EventRecord, RouteRecord, RunRecord
-from leaderboard.score import Score
+from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.run_json import (
+    FORMAT,
+    FORMAT_VERSION,
+    ROUTE_FORMAT,
+    route_from_json,
+    route_to_json,
+    run_from_json,
+    run_hash,
+    run_to_json,
+)
 
 CARLA_FILE = "results.json"
 RECORD_FILE = "driveinsight.json"
 ROUTES_FOLDER = "routes"
-FORMAT = "driveinsight-run"
-ROUTE_FORMAT = "driveinsight-route"
-FORMAT_VERSION = 2
 
 _Value = TypeVar("_Value")
 
@@ -251,7 +255,7 @@ def _parsed(path: Path, form: str, parse: Callable[[Mapping[str, Any]], _Value])
 def _content(path: Path, form: str) -> Mapping[str, Any]:
     """The JSON object in a file of ours, whose format and version are right."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_number)
     except (ValueError, OSError) as error:
         raise DamagedError(
             f"{path} is not whole JSON ({error}): fetch it again from where it came, or remove it "
@@ -270,6 +274,10 @@ def _content(path: Path, form: str) -> Mapping[str, Any]:
     return content
 
 
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
 def _parse(
     path: Path, content: Mapping[str, Any], parse: Callable[[Mapping[str, Any]], _Value]
 ) -> _Value:
@@ -279,58 +287,3 @@ def _parse(
         raise DamagedError(
             f"{path} lacks or garbles a field ({error!r}): evaluate again"
         ) from error
-
-
-def run_hash(run: RunRecord) -> str:
-    """What a run's routes call it by: a hash of everything but the routes."""
-    text = json.dumps(run_to_json(run), sort_keys=True)
-    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
-
-
-def run_to_json(run: RunRecord) -> dict[str, Any]:
-    """The run as JSON values, without its routes."""
-    fields = {field.name: getattr(run, field.name) for field in dataclasses.fields(run)}
-    del fields["routes"]
-    fields["seeds"] = list(run.seeds)
-    fields["requires"] = dict(run.requires)
-    fields["options"] = dict(run.options)
-    fields["versions"] = dict(run.versions)
-    return {"format": FORMAT, "format_version": FORMAT_VERSION, **fields}
-
-
-def run_from_json(content: Mapping[str, Any]) -> RunRecord:
-    """The inverse of `run_to_json`: a run without routes."""
-    names = [field.name for field in dataclasses.fields(RunRecord) if field.name != "routes"]
-    values = {name: content[name] for name in names}
-    values["seeds"] = tuple(values["seeds"])
-    return RunRecord(**values)
-
-
-def route_to_json(record: RouteRecord) -> dict[str, Any]:
-    """The route as JSON values."""
-    values = dataclasses.asdict(record)
-    values["score"]["driving_score"] = record.score.driving_score
-    values["events"] = [
-        {**event, "kind": EventKind(event["kind"]).name.lower()} for event in values["events"]
-    ]
-    return values
-
-
-def route_from_json(content: Mapping[str, Any]) -> RouteRecord:
-    """The inverse of `route_to_json`."""
-    values = {field.name: content[field.name] for field in dataclasses.fields(RouteRecord)}
-    score, bound = values["score"], values["bound"]
-    kept = Score(
-        route_completion=score["route_completion"], infraction_score=score["infraction_score"]
-    )
-    if score["driving_score"] != kept.driving_score:
-        raise ValueError(f"driving_score {score['driving_score']} is not the product of the others")
-    values["score"] = kept
-    values["bound"] = None if bound is None else Bound(**bound)
-    values["events"] = tuple(
-        EventRecord(**{**event, "kind": EventKind[event["kind"].upper()]})
-        for event in values["events"]
-    )
-    values["interventions"] = tuple(values["interventions"])
-    values["trace"] = tuple(tuple(row) for row in values["trace"])
-    return RouteRecord(**values)

@@ -21,9 +21,8 @@ from leaderboard.results import (
     read_head,
     read_route,
     route_files,
-    run_from_json,
-    run_to_json,
 )
+from leaderboard.run_json import run_from_json, run_to_json
 
 _NAMES = {
     "agent_hash": "the hash of the agent's code",

@@ -23,12 +23,9 @@ from leaderboard.results import (
     ResultsError,
     prepare_folder,
     read_run,
-    route_from_json,
-    route_to_json,
-    run_from_json,
-    run_to_json,
     write_run,
 )
+from leaderboard.run_json import route_from_json, route_to_json, run_from_json, run_to_json
 from leaderboard.score import Score
 
 LABELS = [
@@ -293,6 +290,46 @@ def test_a_file_of_another_version_or_without_a_field_is_refused(tmp_path):
     (tmp_path / RECORD_FILE).write_text(json.dumps(content))
     with pytest.raises(ResultsError, match="'cpu'"):
         read_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("find", "put", "said"),
+    [
+        ('"game_s": 200.0', '"game_s": "200"', "game_s must be of type float"),
+        ('"steps": 2000', '"steps": true', "steps must be of type int"),
+        ('"infraction_score":0.7', '"infraction_score":NaN', "NaN is no number"),
+        ('"red_light"', '"blue_light"', "BLUE_LIGHT"),
+        (' "steps": 2000,\n', "", "KeyError.*steps"),
+        ('"tick":40', '"tick":"40"', "tick must be of type int"),
+        ('"format_version": 2', '"format_version": 1', "format version 1, this program reads 2"),
+        ('"driveinsight-route"', '"driveinsight-run"', "is not a 0000.json of ours"),
+        ('"index": 0', '"index": 7', "it was renamed"),
+    ],
+)
+def test_a_garbled_route_is_refused_with_what_is_wrong(tmp_path, find, put, said):
+    write_run(tmp_path, run_of(RED))
+    path = tmp_path / "routes" / "0000.json"
+    text = path.read_text()
+    assert find in text
+    path.write_text(text.replace(find, put))
+    with pytest.raises(ResultsError, match=said):
+        read_run(tmp_path)
+
+
+def test_routes_of_another_run_are_refused(tmp_path):
+    write_run(tmp_path / "a", run_of(RED))
+    write_run(tmp_path / "b", run_of(RED, agent="highway"))
+    ours, theirs = (tmp_path / name / "routes" / "0000.json" for name in "ab")
+    ours.write_text(theirs.read_text())
+    with pytest.raises(ResultsError, match="belongs to another run"):
+        read_run(tmp_path / "a")
+
+
+def test_overwriting_takes_all_routes_of_the_earlier_run_away(tmp_path):
+    write_run(tmp_path, run_of(RED, route(route_id="8", index=1)))
+    prepare_folder(tmp_path, overwrite=True)
+    write_run(tmp_path, run_of(RED, agent="highway"))
+    assert len(read_run(tmp_path).routes) == 1
 
 
 def test_a_missing_folder_is_answered_with_where_results_come_from(tmp_path):
