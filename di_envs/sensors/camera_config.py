@@ -9,8 +9,10 @@ pitch lifts it. A point (a, r, u) ahead, right and up of the camera is seen at
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
+import numbers
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,9 +49,15 @@ class CameraConfig:
     pitch_rad: float = 0.0
 
     def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name != "name" and not isinstance(value, numbers.Real):
+                raise ValueError(
+                    f"Camera '{self.name}': {field.name} must be a number; got {value!r}."
+                )
         for side in ("width", "height"):
             pixels = getattr(self, side)
-            if isinstance(pixels, bool) or int(pixels) != pixels or not 1 <= pixels <= LARGEST_PX:
+            if isinstance(pixels, bool) or pixels % 1 != 0 or not 1 <= pixels <= LARGEST_PX:
                 raise ValueError(
                     f"Camera '{self.name}' needs a {side} of 1 to {LARGEST_PX} pixels; got "
                     f"{pixels!r}. Presets: small is 256 x 144, paper 1600 x 900."

@@ -140,6 +140,35 @@ def test_nothing_stands_on_a_lane_or_a_sidewalk(town, scene):
     assert checked > 400
 
 
+def test_decks_leave_no_gap_below_the_elevated_lanes(town, scene):
+    """Every quarter of a metre along them some deck lies below, its top within 6 cm of the lane."""
+    lanes, boxes = town.lanes, scene.boxes
+    decks = np.flatnonzero(boxes.material == Material.DECK)
+    index = lane_points(town, LaneKind.DRIVING, elevated=True)
+    index = index[lanes.point_lane[np.minimum(index + 1, len(lanes.points) - 1)]
+                  == lanes.point_lane[index]]  # fmt: skip
+    checked = 0
+    for share in (0.0, 0.25, 0.5, 0.75):
+        points = (1.0 - share) * lanes.points[index, :3] + share * lanes.points[index + 1, :3]
+        points = points[points[:, 2] > 0.5]
+        nearest = np.full(len(points), np.inf)
+        for deck in decks:
+            c, s = math.cos(boxes.yaw[deck]), math.sin(boxes.yaw[deck])
+            pitch = math.tan(boxes.pitch[deck])
+            along = c * (points[:, 0] - boxes.centre[deck, 0])
+            along += s * (points[:, 1] - boxes.centre[deck, 1])
+            across = c * (points[:, 1] - boxes.centre[deck, 1])
+            across -= s * (points[:, 0] - boxes.centre[deck, 0])
+            over = boxes.half[deck, 2] / math.cos(boxes.pitch[deck])
+            top = boxes.centre[deck, 2] + over + pitch * along
+            reach = boxes.half[deck, 0] * math.cos(boxes.pitch[deck])
+            below = (np.abs(along) <= reach) & (np.abs(across) <= boxes.half[deck, 1])
+            nearest = np.where(below, np.minimum(nearest, np.abs(top - points[:, 2])), nearest)
+        assert nearest.max() < 0.06, (share, int((nearest > 0.06).sum()), points[nearest.argmax()])
+        checked += len(points)
+    assert checked > 4000
+
+
 def test_the_same_town_gives_the_same_scene_again(town, scene):
     again = build_scene(town)
     for ours, theirs in zip(scene.boxes, again.boxes, strict=True):
