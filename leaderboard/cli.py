@@ -6,10 +6,14 @@ after the arguments are known to be right.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import operator
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import tyro
 
@@ -53,7 +57,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0; 1 if a simulation or a worker process died, or a claim does not stand; 2
         for a wrong request; 130 if interrupted.
     """
-    command: Command = tyro.cli(Command, prog="driveinsight", description=HELP, args=arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    commands: Any = Command if given and not given[0].startswith("-") else _briefly(Command)
+    command: Command = tyro.cli(commands, prog="driveinsight", description=HELP, args=given)
     try:
         with _plain_warnings():
             return command.run()
@@ -63,6 +69,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UsageError as error:
         complain(str(error))
         return EXIT_USAGE
+
+
+def _briefly(commands: Any) -> Any:
+    """The commands with a line of help each, for the list of them all."""
+    brief = []
+    for command in get_args(commands):
+        kind, described = get_args(command)
+        first = (described.description or kind.__doc__ or "").partition("\n")[0]
+        brief.append(Annotated[kind, dataclasses.replace(described, description=first)])
+    return functools.reduce(operator.or_, brief)
 
 
 @contextmanager

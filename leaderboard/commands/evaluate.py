@@ -155,5 +155,16 @@ def _print_run(run: RunRecord, folder: Path) -> None:
     print_run(run, Console())
     say(
         f"Written: {folder / CARLA_FILE} (CARLA's schema) and {folder / RECORD_FILE} (all of it).",
-        f"Next: driveinsight show {folder}",
+        *_next_steps(run, folder),
     )
+
+
+def _next_steps(run: RunRecord, folder: Path) -> list[str]:
+    """Commands that make sense now."""
+    if run.lost or not run.complete:
+        return [f"Next: the same command with --output {folder} --resume drives what is missing"]
+    return [
+        f"Next: driveinsight show {folder}",
+        f"      driveinsight verify {folder}       does the claim stand?",
+        f"      driveinsight compare {folder} OTHER",
+    ]

@@ -163,24 +163,6 @@ class InterruptsTheRun(_OnSeedTwo):
         time.sleep(FOR_EVER_S)
 
 
-class InterruptsTwice(_OnSeedTwo):
-    """A second Ctrl-C, once the first has been seen: it follows in the parent's handler's wake."""
-
-    def misbehave(self) -> Any:
-        for _ in range(2):
-            os.kill(os.getppid(), signal.SIGINT)
-            time.sleep(0.01)
-        time.sleep(FOR_EVER_S)
-
-
-class KillsTheGroup(_OnSeedTwo):
-    """As a machine that goes down does."""
-
-    def misbehave(self) -> Any:
-        os.killpg(os.getpgrp(), signal.SIGKILL)
-        return BRAKE
-
-
 class KillsItsWorker(_OnSeedTwo):
     def misbehave(self) -> Any:
         os.kill(os.getpid(), signal.SIGKILL)

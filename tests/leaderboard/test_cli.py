@@ -36,6 +36,14 @@ def test_help_teaches_by_example(command, capsys):
     assert f"  driveinsight {command} " in capsys.readouterr().out
 
 
+def test_the_list_of_commands_has_a_line_or_two_for_each(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    listed = capsys.readouterr().out.partition("subcommands")[2]
+    assert "evaluate" in listed
+    assert "Examples" not in listed
+
+
 def test_the_list_of_suites_is_complete_and_says_what_is_next(capsys):
     assert main(["suites"]) == 0
     shown = capsys.readouterr().out
