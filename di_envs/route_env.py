@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -14,10 +14,10 @@ from di_envs.actions import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
 from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
-from di_envs.reward import standing_of
+from di_envs.reward import Standing, standing_of
 from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
-from di_envs.world.world import Snapshot, World, WorldView
+from di_envs.world.world import Event, Snapshot, World, WorldView
 
 Observation = dict[str, Any]
 Info = dict[str, Any]
@@ -147,23 +147,38 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             ValueError: If the action is not in the action space.
             gymnasium.error.ResetNeeded: Before the first reset, and after an episode's end.
         """
-        control = checked_action(action)
+        before = self.hold(checked_action(action))
+        events = self.world.run(self.config.control_ticks)
+        outcome = self.outcome(before, events)
+        observation = self._observer.observe()
+        if self.render_mode == "human":
+            self._draw(observation)
+        return observation, *outcome
+
+    def hold(self, control: np.ndarray[Any, Any]) -> Standing:
+        """The first part of a step: holds a checked action; `world.run` is the second.
+
+        Returns:
+            The standing before the step, for `outcome`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: Before the first reset, and after an episode's end.
+        """
         if self._over:
             raise gymnasium.error.ResetNeeded(
                 "There is no episode to step: it is over, or none was begun. Call reset() first."
             )
+        self.world.hold(control[None])
+        return standing_of(self.view.state, _EGO)
+
+    def outcome(self, before: Standing, events: Sequence[Event]) -> tuple[float, bool, bool, Info]:
+        """The last part of a step but for the look: reward, terminated, truncated, info."""
         view, course = self.view, self._course
-        before = standing_of(view.state, _EGO)
-        events = tuple(self.world.advance(control[None], self.config.control_ticks))
         after = standing_of(view.state, _EGO)
         terminated, truncated = course.ending(view, _EGO, before, after)
         self._over = terminated or truncated
-        info = course.info(view, _EGO, before, after, events)
-        reward = sum(info["reward_terms"].values())
-        observation = self._observer.observe()
-        if self.render_mode == "human":
-            self._draw(observation)
-        return observation, reward, terminated, truncated, info
+        info = course.info(view, _EGO, before, after, tuple(events))
+        return sum(info["reward_terms"].values()), terminated, truncated, info
 
     def render(self) -> Any:
         """A picture of the present state, (H, W, 3) uint8; None unless the mode is `rgb_array`.

@@ -19,7 +19,9 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from di_envs.actions import checked_action
+from di_envs.reward import Standing
 from di_envs.route_env import Info, Observation, RouteEnv
+from di_envs.world.world import Event
 
 Steps = tuple[
     Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
@@ -115,16 +117,16 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         left = dict(options or {})
         mask = self._mask(left.pop("reset_mask", None))
         chosen = np.flatnonzero(mask).tolist()
-        observations: list[Observation] = [{}] * self.num_envs
         infos: list[Info] = [{}] * self.num_envs
+        rows = self._rows()
 
         def begin(index: int) -> None:
-            observations[index], infos[index] = self._begin(index, seeds[index], left)
+            infos[index] = self._begin(index, seeds[index], left, rows)
 
         self._each(chosen, begin)
         for index in np.flatnonzero(~mask).tolist():
-            observations[index] = self.envs[index].observe()
-        return self._batch(observations), self._infos(infos, chosen)
+            _write(rows, index, self.envs[index].observe())
+        return rows, self._infos(infos, chosen)
 
     def step(self, actions: NDArray[np.float32]) -> Steps:
         """Steps every world; those whose episode has ended are reset as `autoreset_mode` says.
@@ -136,34 +138,33 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             ValueError: If an action is refused, before any world has moved.
             gymnasium.error.ResetNeeded: If a world that has ended is not reset automatically.
         """
-        count, next_step = self.num_envs, self.autoreset_mode == AutoresetMode.NEXT_STEP
-        resets = self._ended if next_step else np.zeros(count, bool)
+        next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
+        resets = self._ended if next_step else np.zeros(self.num_envs, bool)
         controls = self._checked(actions, resets)
-        observations: list[Observation] = [{}] * count
-        infos: list[Info] = [{}] * count
-        rewards = np.zeros(count)
-        ended = np.zeros((2, count), bool)  # terminated, truncated
-        finals: dict[int, tuple[Observation, Info]] = {}
+        stepped = np.flatnonzero(~resets).tolist()
+        before = {index: self.envs[index].hold(controls[index]) for index in stepped}
+        events: dict[int, list[Event]] = {}
+        infos: list[Info] = [{}] * self.num_envs
+        rows = self._rows()
 
         def advance(index: int) -> None:
             if resets[index]:
-                observations[index], infos[index] = self._begin(index, None, {})
-                return
-            step = self._step(index, controls[index])
-            observations[index], rewards[index], ended[0, index], ended[1, index], info = step
-            if ended[:, index].any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
-                finals[index] = observations[index], info
-                observations[index], info = self._begin(index, None, {})
-            infos[index] = info
+                infos[index] = self._begin(index, None, {}, rows)
+            else:
+                env = self.envs[index]
+                events[index] = env.world.run(env.config.control_ticks)
+                _write(rows, index, env.observe())
 
-        self._each(range(count), advance)
-        self._ended = ended[0] | ended[1]
-        batched: Info = {}
-        for index, (observation, info) in sorted(finals.items()):
-            final = {"final_obs": observation, "final_info": info}
-            batched = self._add_info(batched, final, index)
-        batched |= self._infos(infos, range(count))
-        return self._batch(observations), rewards, ended[0], ended[1], batched
+        self._each(range(self.num_envs), advance)
+        rewards = np.zeros(self.num_envs)
+        ended = np.zeros((2, self.num_envs), bool)  # terminated, truncated
+        for index in stepped:
+            outcome = self._outcome(index, before[index], events[index])
+            rewards[index], ended[0, index], ended[1, index], infos[index] = outcome
+        self._ended = ended.any(axis=0)
+        batched = self._restart(rows, infos) if self._restarts() else {}
+        batched |= self._infos(infos, range(self.num_envs))
+        return rows, rewards, ended[0], ended[1], batched
 
     def render(self) -> tuple[Any, ...]:
         """A frame of each world."""
@@ -186,19 +187,43 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             env.close()
 
     def _begin(
-        self, index: int, seed: int | None, options: Mapping[str, Any]
-    ) -> tuple[Observation, Info]:
+        self, index: int, seed: int | None, options: Mapping[str, Any], rows: Observation
+    ) -> Info:
+        """Resets a world; its observation goes to its row."""
         self._steps[index] = 0
         self._ended[index] = False
-        return self.envs[index].reset(seed=seed, options=options)
+        observation, info = self.envs[index].reset(seed=seed, options=options)
+        _write(rows, index, observation)
+        return info
 
-    def _step(
-        self, index: int, control: NDArray[np.float64]
-    ) -> tuple[Observation, float, bool, bool, Info]:
-        observation, reward, terminated, truncated, info = self.envs[index].step(control)
+    def _outcome(
+        self, index: int, before: Standing, events: Sequence[Event]
+    ) -> tuple[float, bool, bool, Info]:
+        reward, terminated, truncated, info = self.envs[index].outcome(before, events)
         self._steps[index] += 1
         truncated = truncated or (self._limit is not None and self._steps[index] >= self._limit)
-        return observation, reward, terminated, truncated, info
+        return reward, terminated, truncated, info
+
+    def _restarts(self) -> bool:
+        """Whether a step that ends an episode begins the next one, and some have ended."""
+        return self.autoreset_mode == AutoresetMode.SAME_STEP and bool(self._ended.any())
+
+    def _restart(self, rows: Observation, infos: list[Info]) -> Info:
+        """Resets the worlds that have ended; returns what they ended with, as Gymnasium has it."""
+        ended = np.flatnonzero(self._ended).tolist()
+        batched: Info = {}
+        for index in ended:
+            last = {name: _own(array[index]) for name, array in rows.items()}
+            final = {"final_obs": last, "final_info": infos[index]}
+            batched = self._add_info(batched, final, index)
+        flags = self._ended.copy()
+
+        def begin(index: int) -> None:
+            infos[index] = self._begin(index, None, {}, rows)
+
+        self._each(ended, begin)
+        self._ended = flags
+        return batched
 
     def _each(self, indices: Iterable[int], work: Callable[[int], None]) -> None:
         """Does the work for each index, the threads taking the next one as they become free."""
@@ -251,13 +276,10 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         rows = np.where(resets[:, None], 0.0, rows)
         return [checked_action(row) for row in rows]
 
-    def _batch(self, observations: Sequence[Observation]) -> Observation:
-        """Observations as arrays with a leading axis, each a fresh one."""
-        batch: Any = create_empty_array(self.single_observation_space, n=self.num_envs, fn=np.empty)
-        for name, rows in batch.items():
-            for index, observation in enumerate(observations):
-                rows[index] = observation[name]
-        return dict(batch)
+    def _rows(self) -> Observation:
+        """Fresh arrays for the observations of all worlds, a row each."""
+        rows: Any = create_empty_array(self.single_observation_space, n=self.num_envs, fn=np.empty)
+        return dict(rows)
 
     def _infos(self, infos: Sequence[Info], chosen: Iterable[int]) -> Info:
         """`info` as Gymnasium batches it: arrays, each with a mask of who has the entry."""
@@ -268,6 +290,17 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         for index in indices:
             batched = self._add_info(batched, infos[index], index)
         return batched
+
+
+def _write(rows: Observation, index: int, observation: Observation) -> None:
+    """Copies a world's observation into its row."""
+    for name, row in rows.items():
+        row[index] = observation[name]
+
+
+def _own(row: Any) -> Any:
+    """A row that later writing leaves as it is."""
+    return row.copy() if isinstance(row, np.ndarray) else row
 
 
 def batched_infos(infos: Sequence[Info]) -> Info:

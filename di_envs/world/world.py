@@ -175,17 +175,27 @@ class World:
             controls: (E, 3) throttle 0..1, steer -1..1 (positive right), brake 0..1.
             ticks: How many ticks of TICK_S.
         """
+        self.hold(controls)
+        return self.run(ticks)
+
+    def hold(self, controls: NDArray[np.float64]) -> None:
+        """Sets the egos' controls, (E, 3) as for `advance`; they hold until others are set."""
         state = self._state
         state.throttle[:] = controls[:, 0]
         state.steer[:] = controls[:, 1]
         state.brake[:] = controls[:, 2]
+
+    def run(self, ticks: int) -> list[Event]:
+        """Lets time pass and returns what happened. Nearly all of it without Python's lock."""
         events: list[Event] = []
         while ticks > 0:
             batch = min(ticks, self._batch)
             rows = self._advance(
-                state, self._scenery, self._scratch, self._vehicle_end, batch, self._event_rows
-            )
-            events += [_event(row) for row in self._event_rows[:rows]]
+                self._state, self._scenery, self._scratch, self._vehicle_end, batch,
+                self._event_rows,
+            )  # fmt: skip
+            if rows:
+                events += [_event(row) for row in self._event_rows[:rows]]
             ticks -= batch
         return events
 
