@@ -176,6 +176,16 @@ def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no
         fill_gnss(sight.state, ego, sight.geo_origin[0], sight.geo_origin[1], sight.gnss)
 
 
+def prompt_observation(prompt: Prompt) -> dict[str, NDArray[Any]]:
+    """Copies of a prompt's arrays by name, or of those of many worlds, with all flags of presence.
+
+    `command` keeps its last axis, of length 1.
+    """
+    found = {name: getattr(prompt, name).copy() for name in COMPONENTS}
+    found["prompt_present"] = np.ones((*prompt.command.shape[:-1], len(COMPONENTS)), np.int8)
+    return found
+
+
 class Observer:
     """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables.
 
@@ -211,6 +221,7 @@ class Observer:
         self._half_sweeps = half_sweeps
         self.weather = weather or "ClearNoon"
         self._ego, self._town = ego, town
+        self._prompt: Prompt | None = None
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
         self._geo_origin = np.array(town.geo_origin, np.float64)
@@ -219,7 +230,12 @@ class Observer:
         """Another observer, of that ego: it shares the static tables, `start` makes its buffers."""
         other = copy.copy(self)
         other._ego = ego
+        other._prompt = None
         return other
+
+    def write_prompt_to(self, prompt: Prompt) -> None:
+        """Makes `prompt` the buffer, from the next `start` on; a row of many worlds', say."""
+        self._prompt = prompt
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""
@@ -230,7 +246,7 @@ class Observer:
             lanes=self._town.lanes,
             chunks=self._chunks,
             geo_origin=self._geo_origin,
-            prompt=empty_prompt(),
+            prompt=empty_prompt() if self._prompt is None else self._prompt,
             imu=np.zeros(7, np.float32),
             gnss=np.zeros(3, np.float64),
         )
@@ -255,15 +271,22 @@ class Observer:
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
-        sight = self._sight
-        self._fill(sight, self._ego, self._with_prompt, self._with_inertial)
         observation: dict[str, Any] = {}
+        self.write_tables()
         if self._with_prompt:
-            prompt = sight.prompt
-            observation["command"] = prompt.command[0]
-            for name in COMPONENTS[1:]:
-                observation[name] = getattr(prompt, name).copy()
-            observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
+            observation.update(prompt_observation(self._sight.prompt))
+            observation["command"] = observation["command"][0]
+        observation.update(self.measure())
+        return observation
+
+    def write_tables(self) -> None:
+        """Writes the prompt and the inertial sensors to their buffers: the first part of a look."""
+        self._fill(self._sight, self._ego, self._with_prompt, self._with_inertial)
+
+    def measure(self) -> dict[str, Any]:
+        """What sensors see: the second part of a look, all of it but the prompt."""
+        observation: dict[str, Any] = {}
+        sight = self._sight
         if self._with_inertial:
             observation["imu"] = sight.imu.copy()
             observation["gnss"] = sight.gnss.copy()

@@ -95,18 +95,18 @@ def prompt_route_of(plan: RoutePlan) -> PromptRoute:
     return PromptRoute(plan.points, plan.option, plan.targets)
 
 
-def empty_prompt() -> Prompt:
-    """A prompt to be filled: all zeros."""
+def empty_prompt(*worlds: int) -> Prompt:
+    """A prompt to be filled, or those of so many worlds: all zeros."""
     return Prompt(
-        command=np.zeros(1, np.int64),
-        target_point=np.zeros(3, np.float32),
-        routing=np.zeros((ROUTING_POINTS, 4), np.float32),
-        map=np.zeros((MAP_POLYLINES, POINTS, 4), np.float32),
-        obstacles=np.zeros((OBSTACLES, 9), np.float32),
-        traffic_lights=np.zeros((LIGHTS, 5), np.float32),
-        stop_signs=np.zeros((STOP_SIGNS, 4), np.float32),
-        speed=np.zeros(1, np.float32),
-        speed_history=np.zeros(SPEED_HISTORY, np.float32),
+        command=np.zeros((*worlds, 1), np.int64),
+        target_point=np.zeros((*worlds, 3), np.float32),
+        routing=np.zeros((*worlds, ROUTING_POINTS, 4), np.float32),
+        map=np.zeros((*worlds, MAP_POLYLINES, POINTS, 4), np.float32),
+        obstacles=np.zeros((*worlds, OBSTACLES, 9), np.float32),
+        traffic_lights=np.zeros((*worlds, LIGHTS, 5), np.float32),
+        stop_signs=np.zeros((*worlds, STOP_SIGNS, 4), np.float32),
+        speed=np.zeros((*worlds, 1), np.float32),
+        speed_history=np.zeros((*worlds, SPEED_HISTORY), np.float32),
     )
 
 

@@ -14,6 +14,7 @@ from di_envs.actions import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
 from di_envs.course import load_course
 from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.observation import Observer
 from di_envs.reward import Standing, standing_of
 from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
@@ -222,6 +223,11 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         check_name(weather, WEATHERS, "weather")
         self._observer.weather = weather
         self._observer.start(self.view)
+
+    @property
+    def observer(self) -> Observer:
+        """Looks at the world through the ego's eyes."""
+        return self._observer
 
     def save_state(self) -> RouteEnvSnapshot:
         """A value from which `restore_state` brings everything back. See `di_envs.save`."""

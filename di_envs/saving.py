@@ -13,9 +13,17 @@ from typing import Any
 
 import gymnasium
 
+Wrapped = gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]
+
+_WRAPPERS = (gymnasium.Wrapper, gymnasium.vector.VectorWrapper)
+
 # What every wrapper has by being one: structure and spaces, not memory.
 _STRUCTURE = frozenset(
     {
+        "_single_action_space",
+        "_single_observation_space",
+        "single_action_space",
+        "single_observation_space",
         "env",
         "spec",
         "render_mode",
@@ -38,7 +46,7 @@ class EnvSnapshot:
     layers: tuple[tuple[str, Any], ...]  # (class name, memory)
 
 
-def save(env: gymnasium.Env[Any, Any]) -> EnvSnapshot:
+def save(env: Wrapped) -> EnvSnapshot:
     """Takes a snapshot of an environment and of the wrappers around it.
 
     A layer that defines `save_state()` and `restore_state(value)` says itself what its memory is;
@@ -46,7 +54,8 @@ def save(env: gymnasium.Env[Any, Any]) -> EnvSnapshot:
     references to other layers of the chain are kept as they are.
 
     Args:
-        env: An environment, wrapped or not, whose innermost layer can save itself.
+        env: An environment or a `RouteVectorEnv`, wrapped or not, whose innermost layer can save
+            itself.
 
     Returns:
         A value that shares nothing with `env`; it can be restored any number of times.
@@ -60,7 +69,7 @@ def save(env: gymnasium.Env[Any, Any]) -> EnvSnapshot:
     )
 
 
-def restore(env: gymnasium.Env[Any, Any], snapshot: EnvSnapshot) -> None:
+def restore(env: Wrapped, snapshot: EnvSnapshot) -> None:
     """Puts an environment and its wrappers back to where they were, or a twin of them there.
 
     Args:
@@ -83,8 +92,8 @@ def restore(env: gymnasium.Env[Any, Any], snapshot: EnvSnapshot) -> None:
         _put_back(layer, memory, chain)
 
 
-def _layers(env: gymnasium.Env[Any, Any]) -> Iterator[Any]:
-    while isinstance(env, gymnasium.Wrapper):
+def _layers(env: Any) -> Iterator[Any]:
+    while isinstance(env, _WRAPPERS):
         yield env
         env = env.env
     yield env
@@ -98,7 +107,7 @@ def _saves_itself(layer: Any) -> bool:
 def _saved(layer: Any, chain: list[Any]) -> Any:
     if _saves_itself(layer):
         return layer.save_state()
-    if not isinstance(layer, gymnasium.Wrapper):
+    if not isinstance(layer, _WRAPPERS):
         raise TypeError(
             f"{type(layer).__name__} cannot be saved: it defines no save_state() and "
             f"restore_state(value), as `RouteEnv` does."

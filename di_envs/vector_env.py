@@ -3,7 +3,8 @@
 The worlds share one town with all its tables, and threads share out the worlds: kernels hold no
 Python lock, so they run side by side in one process, without copies between processes. Each world
 is a `RouteEnv` of its own, so what comes out is bit for bit what single ones give, for any number
-of threads.
+of threads. Threads do what needs no Python, advance worlds and look at them; rewards and `info` are
+made for all once they are through, as threads that keep asking for Python's lock gain nothing.
 """
 
 from __future__ import annotations
@@ -11,21 +12,33 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space, create_empty_array
+from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from di_envs.actions import checked_action
+from di_envs.actions import HIGH, LOW, checked_action
 from di_envs.reward import Standing
-from di_envs.route_env import Info, Observation, RouteEnv
+from di_envs.route_env import Info, Observation, RouteEnv, RouteEnvSnapshot
+from di_envs.vector_rows import WorldRows, batched_infos
 from di_envs.world.world import Event
 
 Steps = tuple[
     Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorSnapshot:
+    """What `RouteVectorEnv.save_state` returns: everything that a step or a reset depends on."""
+
+    worlds: tuple[RouteEnvSnapshot, ...]
+    steps: tuple[int, ...]  # of each world's episode
+    ended: tuple[bool, ...]  # whether the next step resets it, or refuses to step it
 
 
 class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
@@ -90,6 +103,8 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+        assert isinstance(first.observation_space, spaces.Dict)
+        self._looks = WorldRows(first.observation_space, [env.observer for env in self.envs])
         self._limit = max_episode_steps
         self._steps = [0] * num_envs
         self._ended = np.zeros(num_envs, bool)
@@ -118,14 +133,15 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         mask = self._mask(left.pop("reset_mask", None))
         chosen = np.flatnonzero(mask).tolist()
         infos: list[Info] = [{}] * self.num_envs
-        rows = self._rows()
+        rows = self._looks.fresh()
 
         def begin(index: int) -> None:
             infos[index] = self._begin(index, seeds[index], left, rows)
 
         self._each(chosen, begin)
         for index in np.flatnonzero(~mask).tolist():
-            _write(rows, index, self.envs[index].observe())
+            self._looks.look(rows, index)
+        self._looks.add_prompts(rows)
         return rows, self._infos(infos, chosen)
 
     def step(self, actions: NDArray[np.float32]) -> Steps:
@@ -145,26 +161,58 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         before = {index: self.envs[index].hold(controls[index]) for index in stepped}
         events: dict[int, list[Event]] = {}
         infos: list[Info] = [{}] * self.num_envs
-        rows = self._rows()
+        rows, ticks = self._looks.fresh(), self.envs[0].config.control_ticks
 
         def advance(index: int) -> None:
             if resets[index]:
                 infos[index] = self._begin(index, None, {}, rows)
             else:
-                env = self.envs[index]
-                events[index] = env.world.run(env.config.control_ticks)
-                _write(rows, index, env.observe())
+                events[index] = self.envs[index].world.run(ticks)
+                self._looks.look(rows, index)
 
         self._each(range(self.num_envs), advance)
+        self._looks.add_prompts(rows)
         rewards = np.zeros(self.num_envs)
         ended = np.zeros((2, self.num_envs), bool)  # terminated, truncated
         for index in stepped:
             outcome = self._outcome(index, before[index], events[index])
             rewards[index], ended[0, index], ended[1, index], infos[index] = outcome
-        self._ended = ended.any(axis=0)
+        self._ended = ended[0] | ended[1]
         batched = self._restart(rows, infos) if self._restarts() else {}
         batched |= self._infos(infos, range(self.num_envs))
         return rows, rewards, ended[0], ended[1], batched
+
+    def save_state(self) -> VectorSnapshot:
+        """A value from which `restore_state` brings everything back. See `di_envs.save`."""
+        return VectorSnapshot(
+            worlds=tuple(env.save_state() for env in self.envs),
+            steps=tuple(self._steps),
+            ended=tuple(self._ended.tolist()),
+        )
+
+    def restore_state(self, snapshot: VectorSnapshot) -> None:
+        """Puts back what `save_state` returned, of this environment or of one made like it.
+
+        Raises:
+            ValueError: If the snapshot is of another number of worlds, of another town, or of other
+                numbers of actors.
+        """
+        if len(snapshot.worlds) != self.num_envs:
+            raise ValueError(
+                f"The snapshot is of {len(snapshot.worlds)} worlds, but here are {self.num_envs}; "
+                f"make the environment with num_envs={len(snapshot.worlds)}."
+            )
+        for env, world in zip(self.envs, snapshot.worlds, strict=True):
+            env.restore_state(world)
+        self._steps = list(snapshot.steps)
+        self._ended = np.array(snapshot.ended)
+
+    def observe(self) -> Observation:
+        """The present observation once more: after `restore`, for instance. Changes nothing."""
+        rows = self._looks.fresh()
+        self._each(range(self.num_envs), lambda index: self._looks.look(rows, index))
+        self._looks.add_prompts(rows)
+        return rows
 
     def render(self) -> tuple[Any, ...]:
         """A frame of each world."""
@@ -193,7 +241,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._steps[index] = 0
         self._ended[index] = False
         observation, info = self.envs[index].reset(seed=seed, options=options)
-        _write(rows, index, observation)
+        self._looks.write(rows, index, observation)
         return info
 
     def _outcome(
@@ -213,8 +261,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         ended = np.flatnonzero(self._ended).tolist()
         batched: Info = {}
         for index in ended:
-            last = {name: _own(array[index]) for name, array in rows.items()}
-            final = {"final_obs": last, "final_info": infos[index]}
+            final = {"final_obs": self._looks.row(rows, index), "final_info": infos[index]}
             batched = self._add_info(batched, final, index)
         flags = self._ended.copy()
 
@@ -222,6 +269,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             infos[index] = self._begin(index, None, {}, rows)
 
         self._each(ended, begin)
+        self._looks.add_prompts(rows)
         self._ended = flags
         return batched
 
@@ -265,7 +313,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             )
         return mask
 
-    def _checked(self, actions: Any, resets: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    def _checked(self, actions: Any, resets: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The actions of those that will be stepped, all checked before the first one moves."""
         rows = np.asarray(actions)
         if rows.shape != (self.num_envs, 3):
@@ -274,12 +322,11 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
                 f"got shape {rows.shape}."
             )
         rows = np.where(resets[:, None], 0.0, rows)
-        return [checked_action(row) for row in rows]
-
-    def _rows(self) -> Observation:
-        """Fresh arrays for the observations of all worlds, a row each."""
-        rows: Any = create_empty_array(self.single_observation_space, n=self.num_envs, fn=np.empty)
-        return dict(rows)
+        controls = rows.astype(np.float64)
+        if not ((controls >= LOW) & (controls <= HIGH)).all():
+            for row in rows:
+                checked_action(row)  # one of them raises, and says which entry is wrong
+        return controls
 
     def _infos(self, infos: Sequence[Info], chosen: Iterable[int]) -> Info:
         """`info` as Gymnasium batches it: arrays, each with a mask of who has the entry."""
@@ -290,32 +337,6 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         for index in indices:
             batched = self._add_info(batched, infos[index], index)
         return batched
-
-
-def _write(rows: Observation, index: int, observation: Observation) -> None:
-    """Copies a world's observation into its row."""
-    for name, row in rows.items():
-        row[index] = observation[name]
-
-
-def _own(row: Any) -> Any:
-    """A row that later writing leaves as it is."""
-    return row.copy() if isinstance(row, np.ndarray) else row
-
-
-def batched_infos(infos: Sequence[Info]) -> Info:
-    """What `VectorEnv._add_info` makes of infos that all have the same keys, in less time."""
-    batched: Info = {}
-    for key, first in infos[0].items():
-        values = [info[key] for info in infos]
-        if isinstance(first, dict):
-            batched[key] = batched_infos(values)
-        elif type(first) in (int, float, bool):
-            batched[key] = np.array(values, type(first))
-        else:
-            batched[key] = np.fromiter(values, object, len(values))
-        batched[f"_{key}"] = np.ones(len(infos), bool)
-    return batched
 
 
 def _cores() -> int:

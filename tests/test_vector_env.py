@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
-import di_envs  # noqa: F401 (registers the ids)
+import di_envs
 from di_envs.config import OBSERVATION_GROUPS
 from di_envs.route_env import RouteEnv
 from di_envs.vector_env import RouteVectorEnv
@@ -106,6 +107,31 @@ def test_an_episode_that_is_over_is_not_stepped_without_autoreset():
         over = terminated[0] or truncated[0]
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.step(ACTIONS[:1])
+
+
+def test_a_restored_vector_goes_on_with_the_same_bits_past_resets():
+    """Also in another one made alike, and in a wrapper that counts."""
+    ours, _ = make_pair(AutoresetMode.NEXT_STEP, 2)
+    env = RecordEpisodeStatistics(ours)
+    env.reset(seed=21)
+    for _ in range(60):
+        env.step(ACTIONS)
+    snapshot = di_envs.save(env)
+    expected = [env.step(ACTIONS) for _ in range(40)]
+    assert any((step[2] | step[3]).any() for step in expected)
+    other = RecordEpisodeStatistics(make_pair(AutoresetMode.NEXT_STEP, 1)[0])
+    for again in (env, other):
+        di_envs.restore(again, snapshot)
+        for step in expected:
+            found = again.step(ACTIONS)
+            for each in (found, step):  # wall-clock time of episodes, which no state holds
+                each[4].get("episode", {}).pop("t", None)
+            assert data_equivalence(found, step, exact=True)
+    assert data_equivalence(ours.observe(), expected[-1][0], exact=True)
+    with pytest.raises(ValueError, match="num_envs=3"):
+        di_envs.restore(
+            RecordEpisodeStatistics(RouteVectorEnv(2, suite="toy", traffic=4, walkers=2)), snapshot
+        )
 
 
 def test_an_observation_that_was_handed_out_does_not_change(env):
