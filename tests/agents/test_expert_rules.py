@@ -21,8 +21,10 @@ from straight_road import (
     make_ways,
 )
 
+from agents.expert_actors import PULL_OUT_M
 from agents.expert_control import pedals
 from agents.expert_line import Progress, shift_at
+from agents.expert_path import CHANGE_ROOM_M
 from agents.expert_speed import NO_LIMIT_MPS2, follow, forecast, stop_within, time_to
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import longitudinal_acceleration
@@ -313,3 +315,19 @@ def test_with_its_tail_on_the_line_at_red_a_crawling_car_waits_for_green():
     lights.light[0], lights.phase_ticks[0] = LightState.GREEN, 0
     drive.run(5.0)
     assert drive.x > 160.0
+
+
+def test_from_behind_a_standing_lorry_the_shortest_lane_change_clears_its_corner():
+    """The rear axle follows the path; the right side of the car must pass the lorry's left rear."""
+    length, width, lorry = CHANGE_ROOM_M, 3.5, 1.25
+    corner_x, corner_y = HALF_M + PULL_OUT_M, lorry
+    station = np.linspace(0.0, length, 400)
+    u = station / length
+    rear_y = width * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    yaw = np.arctan(width * 30.0 * u**2 * (1.0 - u) ** 2 / length)
+    dx, dy = corner_x - station, corner_y - rear_y
+    ahead = np.cos(yaw) * dx + np.sin(yaw) * dy - MODEL.rear_axle_m
+    left = np.cos(yaw) * dy - np.sin(yaw) * dx  # it pulls out towards positive y
+    beside = np.abs(ahead) < HALF_M
+    assert (-left[beside] - MODEL.half_width_m).min() > CONFIG.side_margin_m
+    assert (ahead[left > -MODEL.half_width_m] > HALF_M).all()
