@@ -94,3 +94,55 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
         record = driver.drive(Job(index=0, route_id=driver.env.route_ids[0], seed=0))
     assert record.reason == ""
     assert record.score.route_completion > 5.0  # it is made to drive off from the start
+
+
+LEADERBOARD_AGENT = f"carla:{EXAMPLES / 'carla_leaderboard_agent.py'}"
+
+# As many decisions as lead round a corner, hashed; `carla` is hidden where the argument says so
+HASHED = """
+import hashlib
+import sys
+if sys.argv[2] == "hidden":
+    sys.modules["carla"] = None
+from agents import load_agent
+from di_envs import RouteEnv
+from leaderboard.driver import environment_options
+agent = load_agent(sys.argv[1])
+suite = {"suite": "town05_short", "traffic": 10, "walkers": 0, "route_ids": ("14",)}
+env = RouteEnv(**environment_options(suite, agent.requires))
+observation, _ = env.reset(seed=0)
+memory, digest = agent.start(env.plan, 0), hashlib.sha256()
+for _ in range(150):
+    control, memory = agent.act(observation, memory)
+    observation, *_, info = env.step(control)
+    digest.update(control.tobytes())
+assert info["route_completion"] > 30.0, info
+print(digest.hexdigest(), type(agent._agent.control(5.0)).__module__)
+"""
+
+
+def test_a_leaderboard_agent_drives_the_same_with_carlas_wheel_and_without():
+    pytest.importorskip("carla")
+    told = [
+        subprocess.run(
+            [sys.executable, "-W", "error", "-c", HASHED, LEADERBOARD_AGENT, how],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=300,
+        ).stdout.split()
+        for how in ("seen", "hidden")
+    ]
+    assert told[0][0] == told[1][0]
+    assert (told[0][1], told[1][1]) == ("carla.libcarla", "types")
+
+
+@pytest.mark.parametrize(("leaderboard", "route"), [("1.0", "10"), ("2.1", "14")])
+def test_the_leaderboard_agent_completes_a_route_by_its_sensors(leaderboard, route):
+    spec = f"{LEADERBOARD_AGENT}?leaderboard={leaderboard}"
+    assert load_agent(spec).requires.track == Track.SENSORS
+    options = {"suite": "town05_short", "scenarios": "none", "route_ids": (route,)}
+    with Driver(RunSpec(agent=spec, options=options)) as driver:
+        record = driver.drive(Job(index=0, route_id=route, seed=0))
+    assert record.reason == ""
+    assert record.score.driving_score > 90.0

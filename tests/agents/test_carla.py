@@ -52,7 +52,7 @@ class Mine(AutonomousAgent):
     def sensors(self):
         self.CALLS.append(("sensors",))
         return [
-            {"type": "sensor.camera.rgb", "id": "eye", **LEVEL, "width": 32, "height": 16, "fov": 9},
+            dict(LEVEL, type="sensor.camera.rgb", id="eye", width=32, height=16, fov=90),
             {"type": "sensor.other.gnss", "id": "gps", "x": 0.0, "y": 0.0, "z": 0.0},
             {"type": "sensor.speedometer", "id": "speed", "reading_frequency": 20},
         ]
