@@ -155,7 +155,7 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
     with Driver(RunSpec(agent=spec, options=QUIET)) as driver:
         record = driver.drive(Job(index=0, route_id="1", seed=0))
         town = driver.env.view.town
-        calls = driver.new_agent()._class.CALLS
+        calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
     assert calls[-2] == town.opendrive  # the last call is destroy()
 
