@@ -129,7 +129,7 @@ def test_a_leaderboard_agent_drives_the_same_with_carlas_wheel_and_without():
             capture_output=True,
             text=True,
             check=True,
-            timeout=300,
+            timeout=600,
         ).stdout.split()
         for how in ("seen", "hidden")
     ]
