@@ -79,7 +79,13 @@ def drive(
         groups = _groups(spec, scene.requires)
         keys = observation_space(groups, env.config.cameras, env.config.lidar).keys()
         watched = Watched(env, watch, keys)
-        return drive_route(watched, lambda: load_agent(spec.agent), job, rules_named(spec.rules))
+        return drive_route(
+            watched,
+            lambda: load_agent(spec.agent),
+            job,
+            rules_named(spec.rules),
+            requires=scene.requires,
+        )
 
 
 class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):

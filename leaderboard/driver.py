@@ -47,6 +47,7 @@ class Driver:
                 lambda: TimedAgent(self.spec.agent, self._watch, moved),
                 job,
                 self._rules,
+                requires=self.requires,
             )
         finally:
             self._watch.end_job()

@@ -48,6 +48,7 @@ def drive_route(
     job: Job,
     rules: Rules,
     *,
+    requires: Requirements | None = None,
     interventions: tuple[str, ...] = (),
 ) -> RouteRecord:
     """Drives `job` in `env` (a RouteEnv) with a fresh agent, to the end of the route or a fault.
@@ -57,6 +58,7 @@ def drive_route(
         new_agent: Makes the agent.
         job: The route and the seed.
         rules: What the score goes by.
+        requires: What the agent requires, where that is known: some must be set up to find out.
         interventions: What the environment's wrappers do to what the agent sees, for the record.
     """
     started_s = time.perf_counter()
@@ -67,7 +69,7 @@ def drive_route(
     log = EpisodeLog(env.unwrapped.view)
     status = reason = ""
     try:
-        _drive(env, new_agent, observation, job, log)
+        _drive(env, new_agent, requires, observation, job, log)
     except FaultError as fault:
         status, reason = fault.status, fault.reason
         if log.steps == 0 and status == SIMULATION_CRASHED:
@@ -94,13 +96,14 @@ def _reset(env: Any, job: Job) -> Mapping[str, Any]:
 def _drive(
     env: Any,
     new_agent: Callable[[], Agent[Any]],
+    requires: Requirements | None,
     observation: Mapping[str, Any],
     job: Job,
     log: EpisodeLog,
 ) -> None:
     """Lets the agent drive until the environment says that the route is over."""
     view: WorldView = env.unwrapped.view
-    agent, memory = _start(new_agent, view.plans[view.ego], job)
+    agent, memory = _start(new_agent, requires, view.plans[view.ego], job)
     try:
         extras = extra_keys(agent.requires, view)
         log.hashes.add_observation(observation)
@@ -129,11 +132,14 @@ def plan_shown(requires: Requirements, plan: RoutePlan) -> RoutePlan:
 
 
 def _start(
-    new_agent: Callable[[], Agent[Any]], plan: RoutePlan, job: Job
+    new_agent: Callable[[], Agent[Any]],
+    requires: Requirements | None,
+    plan: RoutePlan,
+    job: Job,
 ) -> tuple[Agent[Any], Any]:
     try:
         agent = new_agent()
-        return agent, agent.start(plan_shown(agent.requires, plan), job.world_seed)
+        return agent, agent.start(plan_shown(requires or agent.requires, plan), job.world_seed)
     except SensorSuiteError as error:
         raise FaultError(SENSORS_INVALID, str(error)) from error
     except (Exception, SystemExit) as error:

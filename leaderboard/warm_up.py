@@ -43,7 +43,7 @@ def _drive_a_little(spec: RunSpec, driver: Driver) -> None:
     observation = driver.env.observe()
     with suppress(Exception, SystemExit):
         agent = load_agent(spec.agent)
-        memory = agent.start(plan_shown(agent.requires, view.plans[view.ego]), 0)
+        memory = agent.start(plan_shown(driver.requires, view.plans[view.ego]), 0)
         agent.act({**observation, **extra_keys(agent.requires, view)}, memory)
         agent.close()
     for _ in range(WARM_UP_STEPS):
