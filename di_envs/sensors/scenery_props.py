@@ -19,10 +19,12 @@ from di_envs.keyed_random import Stream, uniform
 from di_envs.sensors.boxes import BoxSpec, Material
 from di_envs.sensors.surfaces import ELEVATED_M, GRASS, TEXEL_M
 from di_envs.sensors.tags import Tag
-from di_envs.town.lanes import LaneKind
+from di_envs.town.lanes import LaneKind, Lanes
 from di_envs.town.town import Town
 
 SLAB_M = 10.0  # length of a deck's pieces
+SHORT_SLAB_M = 2.0  # what is bent is cut shorter, down to this …
+STEP_M = 0.012  # … as long as a flat piece is so far from its lanes: the steps between would show
 DECK_THICKNESS_M = 1.3
 EMBANKMENT_M = 4.0  # decks lower than this stand on earth
 PILLAR_EVERY_M = 24.0
@@ -126,9 +128,7 @@ def _slabs(town: Town, base_z: float) -> Iterator[dict[str, Any]]:
     order = np.argsort(keys, kind="stable")
     index, keys = index[order], keys[order]
     cuts = np.flatnonzero(np.diff(keys)) + 1
-    for rows in np.split(index, cuts):
-        if rows.size < 2:
-            continue
+    for rows in _flat_pieces(lanes, np.split(index, cuts)):
         points, half_width = lanes.points[rows], lanes.width_m[rows] / 2.0
         twice = np.exp(2j * points[:, 3]).mean()  # lanes of both directions lie on one axis
         yaw = float(np.angle(twice)) / 2.0
@@ -153,6 +153,22 @@ def _slabs(town: Town, base_z: float) -> Iterator[dict[str, Any]]:
             "reach": math.hypot(u1 - u0, v1 - v0) / 2.0,
             "station": int(keys[cuts[0] - 1]) if cuts.size else 0,
         }
+
+
+def _flat_pieces(lanes: Lanes, pieces: list[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    """Rows of points of each piece of an elevated road, cut in two as long as it is bent."""
+    for rows in pieces:
+        if rows.size < 2:
+            continue
+        station, z = lanes.road_m[rows], lanes.points[rows, 2]
+        long = float(np.ptp(station))
+        if long > 2.0 * SHORT_SLAB_M:
+            flat = np.polyval(np.polyfit(station, z, 1), station)
+            if np.abs(z - flat).max() > STEP_M:
+                first = station < station.min() + long / 2.0
+                yield from _flat_pieces(lanes, [rows[first], rows[~first]])
+                continue
+        yield rows
 
 
 def _decks(slabs: list[dict[str, Any]], base_z: float, free: FreeGround) -> Iterator[BoxSpec]:

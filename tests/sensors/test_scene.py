@@ -141,7 +141,7 @@ def test_nothing_stands_on_a_lane_or_a_sidewalk(town, scene):
 
 
 def test_decks_leave_no_gap_below_the_elevated_lanes(town, scene):
-    """Every quarter of a metre along them some deck lies below, its top within 6 cm of the lane."""
+    """Every quarter of a metre along them some deck lies below, its top within 2 cm of the lane."""
     lanes, boxes = town.lanes, scene.boxes
     decks = np.flatnonzero(boxes.material == Material.DECK)
     index = lane_points(town, LaneKind.DRIVING, elevated=True)
@@ -164,7 +164,7 @@ def test_decks_leave_no_gap_below_the_elevated_lanes(town, scene):
             reach = boxes.half[deck, 0] * math.cos(boxes.pitch[deck])
             below = (np.abs(along) <= reach) & (np.abs(across) <= boxes.half[deck, 1])
             nearest = np.where(below, np.minimum(nearest, np.abs(top - points[:, 2])), nearest)
-        assert nearest.max() < 0.06, (share, int((nearest > 0.06).sum()), points[nearest.argmax()])
+        assert nearest.max() < 0.02, (share, int((nearest > 0.02).sum()), points[nearest.argmax()])
         checked += len(points)
     assert checked > 4000
 
