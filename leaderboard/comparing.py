@@ -14,6 +14,7 @@ from di_envs.world.kinds import EventKind
 from leaderboard.bootstrap import DifferenceInterval, clustered_interval
 from leaderboard.footing import footing_differences, footing_of
 from leaderboard.record import EventRecord, RouteRecord, RunRecord
+from leaderboard.rules import rules_named
 
 # Options of the environment that change what an agent sees or how often it decides, not the world
 _SEEN_ONLY = frozenset({"observations", "cameras", "lidar", "weather", "control_dt_s"})
@@ -27,10 +28,11 @@ class PairingError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """One route and seed, driven in both runs."""
+    """One route and seed, driven in both runs, and the kinds of events that their rules list."""
 
     before: RouteRecord
     after: RouteRecord
+    listed: tuple[EventKind, ...]
 
     @property
     def difference(self) -> float:
@@ -44,18 +46,18 @@ class Pair:
 
     @property
     def changed(self) -> bool:
-        """Whether the score or any event differs."""
+        """Whether the score or any event that counts differs."""
         return self.before.score != self.after.score or bool(self.gone or self.new)
 
     @property
     def gone(self) -> tuple[EventRecord, ...]:
         """Events of the first run that the second has fewer of, by kind; the last ones."""
-        return _more(self.before.events, self.after.events)
+        return _more(self.before.events, self.after.events, self.listed)
 
     @property
     def new(self) -> tuple[EventRecord, ...]:
         """Events of the second run that the first has fewer of, by kind; the last ones."""
-        return _more(self.after.events, self.before.events)
+        return _more(self.after.events, self.before.events, self.listed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +115,8 @@ def compare_runs(before: RunRecord, after: RunRecord) -> Comparison:
     ours = {(record.route_id, record.seed): record for record in before.routes}
     theirs = {(record.route_id, record.seed): record for record in after.routes}
     shared = [key for key in ours if key in theirs]
-    pairs = [Pair(before=ours[key], after=theirs[key]) for key in shared]
+    listed = rules_named(before.rules).infractions
+    pairs = [Pair(before=ours[key], after=theirs[key], listed=listed) for key in shared]
     driven = tuple(pair for pair in pairs if not (pair.before.lost or pair.after.lost))
     for pair in driven:
         if pair.before.route_hash != pair.after.route_hash:
@@ -151,14 +154,16 @@ def _world_options(run: RunRecord) -> dict[str, object]:
 
 
 def _more(
-    events: tuple[EventRecord, ...], others: tuple[EventRecord, ...]
+    events: tuple[EventRecord, ...],
+    others: tuple[EventRecord, ...],
+    kinds: tuple[EventKind, ...],
 ) -> tuple[EventRecord, ...]:
-    """Those events that are beyond the number of their kind among the others, in time's order."""
+    """Those events of some kinds that are beyond their number among the others, in time's order."""
     left = Counter(event.kind for event in others)
     beyond = []
     for event in events:
         if left[event.kind] > 0:
             left[event.kind] -= 1
-        elif event.kind != EventKind.COMPLETED:
+        elif event.kind in kinds:
             beyond.append(event)
     return tuple(beyond)

@@ -62,9 +62,13 @@ def _interval_text(interval: DifferenceInterval, digits: int) -> str:
 
 
 def _change_table(changes: Sequence[Pair]) -> Table:
-    table = Table(title="what changed", title_justify="left", title_style="bold")
+    table = Table(
+        title="what changed: DS of routes, and the events that are gone or new",
+        title_justify="left",
+        title_style="bold",
+    )
     table.add_column("route")
-    for name in ("seed", "first", "second", "DS"):
+    for name in ("seed", "first", "second", "change"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("by", overflow="fold")
     for pair in changes:

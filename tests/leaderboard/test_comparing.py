@@ -13,7 +13,9 @@ from di_envs.world.kinds import EventKind
 from leaderboard.cli import main
 from leaderboard.comparing import PairingError, compare_runs
 from leaderboard.comparison_table import comparison_tables
+from leaderboard.rescoring import rescored
 from leaderboard.results import write_run
+from leaderboard.rules import CARLA_2_1
 from leaderboard.score import Score
 
 HALF = Score(route_completion=50.0, infraction_score=1.0)
@@ -59,6 +61,18 @@ def test_which_routes_changed_and_by_which_event_is_named():
     assert "route completion 50.0, then 100.0" in text
     assert "3 pairs of route and seed over 3 distinct routes; 2 changed, 1 are the same" in text
     assert "With 3 routes the intervals are likely too narrow" in text
+
+
+def test_only_events_that_the_rules_list_are_changes():
+    """A scenario that began, or a low speed under 1.0, is none."""
+    before, after = runs()
+    slow = event(EventKind.MIN_SPEED, value=99.0)
+    eighth = route("8", 0, 1, events=(event(EventKind.SCENARIO), slow, DONE), route_hash="8")
+    after = replace(after, routes=(after.routes[0], eighth, after.routes[2]))
+    assert [pair.before.route_id for pair in compare_runs(before, after).changes()] == ["9", "7"]
+    both = [rescored(run, CARLA_2_1) for run in (before, after)]
+    changes = compare_runs(*both).changes()
+    assert [pair.new for pair in changes if pair.before.route_id == "8"] == [(slow,)]
 
 
 def test_equal_routes_are_one_cluster():
