@@ -176,7 +176,7 @@ def _is_held(state, actor, ego, step_m, vehicle_end, walker_end):
 
 
 @kernel
-def move_crosser(state, tables, signals, trigger, ego, vehicle_end):
+def move_crosser(state, tables, signals, trigger, ego, vehicle_end, walker_end):
     """One tick of who crosses; at the far side, or when nothing moves any more, he is gone."""
     actor = tables.first_actor[trigger]
     if state.kind[actor] == WALKER and state.walk_waiting[actor] == DOWN:
@@ -188,7 +188,7 @@ def move_crosser(state, tables, signals, trigger, ego, vehicle_end):
         return
     before = state.speed[actor]
     step_m = tables.speed_mps[trigger] * TICK_S
-    if _is_held(state, actor, ego, step_m, vehicle_end, tables.first_actor[0]):
+    if _is_held(state, actor, ego, step_m, vehicle_end, walker_end):
         state.speed[actor] = 0.0
         state.still_ticks[actor] += 1
     else:

@@ -27,6 +27,7 @@ from di_envs.town.town import Town
 Pose = tuple[float, float, float, float]  # x, y, z, yaw
 
 BESIDE_M = 1.2  # beyond the edge of the last driving lane, where a parking lane is looked for
+ABREAST_M = 0.3  # beyond its end a lane is further away than to the side
 PARKING_WIDTH_M = 2.0  # a shoulder wider than this is one, as in CARLA
 FAR_SIDE_M = 1.0  # beyond the last driving lane that somebody crosses
 WIDEST_ROAD_M = 40.0
@@ -72,10 +73,10 @@ def find_kerb(town: Town, lane: int, station_m: float) -> Kerb:
     width = float(width_at(lanes, lane, station_m))
     aside = 0.5 * width + BESIDE_M
     at = x - aside * math.sin(yaw), y + aside * math.cos(yaw)
-    beside, there, lateral, _ = nearest_lane(
+    beside, there, lateral, away = nearest_lane(
         lanes, at[0], at[1], z, BESIDE_M, np.int64(_PARKING_MASK)
     )
-    if beside >= 0:
+    if beside >= 0 and away - abs(lateral) < ABREAST_M:
         broad = float(width_at(lanes, beside, there))
         if broad > PARKING_WIDTH_M - 0.05 or lanes.kind[beside] == LaneKind.PARKING:
             offset = aside - float(lateral) * math.cos(pose_at(lanes, beside, there)[3] - yaw)

@@ -53,7 +53,7 @@ def _crosses(tables, trigger):
 
 
 @kernel
-def move_scenarios(state, tables, signals, vehicle_end):
+def move_scenarios(state, tables, signals, vehicle_end, walker_end):
     """Moves the actors of scenarios and sets the noise of controls; before egos move."""
     for ego in range(state.throttle.size):
         begin, end = tables.start[ego], tables.start[ego + 1]
@@ -65,7 +65,7 @@ def move_scenarios(state, tables, signals, vehicle_end):
             if tables.type[trigger] == DEBRIS:
                 disturb_ego(state, tables, trigger, ego)
             elif _crosses(tables, trigger):
-                move_crosser(state, tables, signals, trigger, ego, vehicle_end)
+                move_crosser(state, tables, signals, trigger, ego, vehicle_end, walker_end)
 
 
 @kernel

@@ -60,7 +60,7 @@ class Scratch(NamedTuple):
 
 
 @kernel
-def advance(state, scenery, scratch, vehicle_end, ticks, out):
+def advance(state, scenery, scratch, vehicle_end, walker_end, ticks, out):
     """Moves a world on by `ticks` ticks; the egos' controls are held in the state.
 
     Args:
@@ -68,6 +68,7 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
         scenery: What it stands on.
         scratch: Working memory.
         vehicle_end: First actor id behind the vehicles.
+        walker_end: First actor id behind the walkers, who follow them.
         ticks: How many ticks.
         out: (N, 8) rows for events, see `event_rows`.
 
@@ -80,8 +81,8 @@ def advance(state, scenery, scratch, vehicle_end, ticks, out):
         state.tick[()] += 1
         advance_lights(state, scenery.signals)
         _move_traffic(state, scenery, scratch, egos, vehicle_end)
-        move_walkers(state, scenery.walk, scenery.signals, vehicle_end)
-        move_scenarios(state, scenery.scenarios, scenery.signals, vehicle_end)
+        move_walkers(state, scenery.walk, scenery.signals, vehicle_end, walker_end)
+        move_scenarios(state, scenery.scenarios, scenery.signals, vehicle_end, walker_end)
         for ego in range(egos):
             if state.kind[ego] != _ABSENT:
                 move_ego(state, ego, scenery.ego_model)

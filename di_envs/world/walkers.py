@@ -34,7 +34,6 @@ SPAWN_ROOM_M = 2.0  # from the middle of an edge, so half of it is left beside i
 SPAWN_STREAM, PACE_STREAM = int(Stream.WALKER_SPAWN), int(Stream.WALKER_PACE)
 TURN_STREAM = int(Stream.WALKER_TURN)
 ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
-PROP = int(ActorKind.PROP)
 
 
 @kernel
@@ -281,16 +280,13 @@ def _walk_on(state, walk, signals, walker, first, end):
 
 
 @kernel
-def move_walkers(state, walk, signals, first):
-    """Advances the walkers from actor `first` on by a tick; lights and vehicles are read as is.
+def move_walkers(state, walk, signals, first, end):
+    """Advances the walkers, the actors [first, end), by a tick; lights and vehicles are read as is.
 
     Actors before `first` are the egos and vehicles that walkers look out for.
     """
-    end = state.kind.size
-    while end > first and state.kind[end - 1] == PROP:  # they come last
-        end -= 1
     for walker in range(first, end):
-        if state.kind[walker] != WALKER or state.walk_edge[walker] < 0:  # a scenario's own
+        if state.kind[walker] != WALKER:
             continue
         if state.walk_waiting[walker] == DOWN:
             _lie(state, walker)
@@ -307,7 +303,7 @@ def mark_busy_crosswalks(state, walk, busy):
     busy[:] = 0
     kind, walk_edge, walk_m = state.kind, state.walk_edge, state.walk_m
     for walker in range(kind.size):
-        if kind[walker] != WALKER or walk_edge[walker] < 0:
+        if kind[walker] != WALKER or walk_edge[walker] < 0:  # one of a scenario has no edge
             continue
         if walk.crosswalk[walk_edge[walker]] < 0:
             continue

@@ -191,8 +191,8 @@ class World:
         while ticks > 0:
             batch = min(ticks, self._batch)
             rows = self._advance(
-                self._state, self._scenery, self._scratch, self._vehicle_end, batch,
-                self._event_rows,
+                self._state, self._scenery, self._scratch, self._vehicle_end, self._walker_end,
+                batch, self._event_rows,
             )  # fmt: skip
             if rows:
                 events += [_event(row) for row in self._event_rows[:rows]]
@@ -290,9 +290,14 @@ class World:
         """Makes a fresh record and the kernels' arguments for these plans."""
         capacity = self._capacity(plans)
         actors = capacity.actors
+        if self._view is None or self._view.plans is not plans:  # else as they are
+            scenarios = scenario_tables(self.town, plans, capacity.first_scenario_actor)
+        else:
+            scenarios = self._scenery.scenarios
         self._record = np.zeros(1, state_dtype(capacity))
         self._state = views_of(self._record)
         self._vehicle_end = capacity.egos + capacity.vehicles
+        self._walker_end = self._vehicle_end + capacity.walkers
         self._scenery = Scenery(
             lanes=self.town.lanes,
             signals=self.town.signals,
@@ -300,7 +305,7 @@ class World:
             tables=self._tables,
             walk=self._walk,
             routes=route_arrays(plans),
-            scenarios=scenario_tables(self.town, plans, capacity.first_scenario_actor),
+            scenarios=scenarios,
             ego_model=self._ego_model,
         )
         self._scratch = Scratch(
@@ -320,6 +325,7 @@ class World:
             self._scenery,
             self._scratch,
             self._vehicle_end,
+            self._walker_end,
             self._batch,
             self._event_rows,
         )

@@ -76,7 +76,7 @@ class Crossing:
     def tick(self, ticks=1):
         for _ in range(ticks):
             self.state.tick[()] += 1
-            move_walkers(self.state, self.walk, self.town.signals, 2)
+            move_walkers(self.state, self.walk, self.town.signals, 2, 3)
             mark_busy_crosswalks(self.state, self.walk, self.busy)
 
     def go(self, edge, station, direction=1, walker=2):
@@ -163,7 +163,7 @@ def test_a_town_without_sidewalks_has_no_walkers():
     state = make_state(walkers=3)
     spawn_walkers(state, walk, 1, 3)
     assert list(state.kind[1:]) == [ActorKind.ABSENT] * 3
-    move_walkers(state, walk, NO_SIGNALS, 1)
+    move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
 
 
 # strolling
@@ -227,7 +227,7 @@ def test_a_fast_walker_does_not_walk_into_a_slow_one():
         state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
     for _ in range(1000):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1)
+        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
         assert state.walk_m[1] - state.walk_m[2] > CLEAR_M
     assert state.walk_m[1] == pytest.approx(50.0)
     assert state.walk_m[2] > 47.0
@@ -248,7 +248,7 @@ def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_one_turns_back():
     gaps = []
     for _ in range(300):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1)
+        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
         gaps.append(abs(state.x[1] - state.x[2]))
     assert CLEAR_M <= min(gaps) < CLEAR_M + 0.1
     assert state.walk_direction[1] == state.walk_direction[2]
@@ -457,7 +457,7 @@ def test_walkers_stroll_on_the_real_town05_which_has_no_crosswalks(shared):
     spawn_walkers(state, walk, 1, 60)
     for _ in range(1200):
         state.tick[()] += 1
-        move_walkers(state, walk, town.signals, 1)
+        move_walkers(state, walk, town.signals, 1, 61)
     places = np.column_stack((state.x, state.y, state.z))[1:]
     assert clearances(town.lanes, places).min() >= 0.25 + 0.4 - 1e-6
     assert (state.kind[1:] == ActorKind.WALKER).all()
