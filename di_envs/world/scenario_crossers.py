@@ -179,6 +179,9 @@ def _is_held(state, actor, ego, step_m, vehicle_end, walker_end):
 def move_crosser(state, tables, signals, trigger, ego, vehicle_end, walker_end):
     """One tick of who crosses; at the far side, or when nothing moves any more, he is gone."""
     actor = tables.first_actor[trigger]
+    if state.kind[actor] == ABSENT:  # somebody took him away
+        end_scenario(state, tables, signals, trigger)
+        return
     if state.kind[actor] == WALKER and state.walk_waiting[actor] == DOWN:
         state.still_ticks[actor] += 1
         if state.still_ticks[actor] > LIE_TICKS:
@@ -224,7 +227,7 @@ def occupy_lanes(occupancy, state, tables, lanes, trigger, below):
     """
     actor = tables.first_actor[trigger]
     down = state.walk_waiting[actor] == DOWN
-    if state.scenario_step[trigger] != CROSSING and not down:
+    if state.kind[actor] == ABSENT or (state.scenario_step[trigger] != CROSSING and not down):
         return
     ahead = 0.0 if down else 0.5 * SHOWN_S * tables.speed_mps[trigger]
     half_length, half_width = state.half_length[actor] + ahead, state.half_width[actor]

@@ -6,10 +6,9 @@ from __future__ import annotations
 from di_envs.kernels import kernel
 from di_envs.keyed_random import Stream, uniform
 from di_envs.world.lights import release_lights
+from di_envs.world.scenario_tables import DONE
 from di_envs.world.state import ActorKind
 
-AHEAD = 0  # not triggered yet: what a fresh record says
-DONE = 9
 ITEMS = 16  # draws that a trigger may make
 
 ABSENT = int(ActorKind.ABSENT)

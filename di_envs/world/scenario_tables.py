@@ -30,7 +30,9 @@ from di_envs.world.scenario_places import (
     point_after,
     road_pose,
 )
-from di_envs.world.state import TICK_S
+from di_envs.world.state import TICK_S, State
+
+AHEAD, DONE = 0, 9  # first and last step of every scenario; a fresh record says AHEAD
 
 # Actors that each type brings: debris, somebody and what hides him, a cyclist
 ACTORS = {1: 3, 3: 2, 4: 1, 7: 0, 8: 0, 9: 0, 10: 0}
@@ -130,6 +132,17 @@ def scenario_tables(town: Town, plans: Sequence[RoutePlan], first_actor: int) ->
         red_ticks=np.array([row.red_ticks for row in rows], np.int64),
         pose=np.concatenate([np.zeros((0, 4)), *poses]),
     )
+
+
+def call_off(state: State, tables: ScenarioTables, actor: int) -> bool:
+    """Lets the scenario of an actor never begin; whether it is one's, and had not begun."""
+    if not tables.first_actor[0] <= actor < tables.first_actor[-1]:
+        return False
+    trigger = int(np.searchsorted(tables.first_actor, actor, side="right")) - 1
+    if state.scenario_step[trigger] != AHEAD:
+        return False
+    state.scenario_step[trigger] = DONE
+    return True
 
 
 def _padded(poses: list[Pose], count: int) -> NDArray[np.float64]:

@@ -22,7 +22,8 @@ from di_envs.world.scenario_crossers import (
 )
 from di_envs.world.scenario_debris import begin_debris, disturb_ego, watch_debris
 from di_envs.world.scenario_lights import begin_lights, watch_lights
-from di_envs.world.scenario_steps import AHEAD, DONE, end_scenario
+from di_envs.world.scenario_steps import end_scenario
+from di_envs.world.scenario_tables import AHEAD, DONE
 from di_envs.world.state import ActorKind, EventKind
 
 TRIGGER_M = 1.5  # from the trigger, within which the route point nearest the ego must lie

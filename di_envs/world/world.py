@@ -30,7 +30,7 @@ from di_envs.world.events import begin_events
 from di_envs.world.lights import start_lights
 from di_envs.world.occupancy import make_occupancy
 from di_envs.world.poles import place_poles
-from di_envs.world.scenario_tables import actors_needed, scenario_tables
+from di_envs.world.scenario_tables import actors_needed, call_off, scenario_tables
 from di_envs.world.spawn import spawn_traffic
 from di_envs.world.state import (
     OCCUPIED_LANES,
@@ -202,10 +202,13 @@ class World:
     def remove_actor(self, actor: int) -> None:
         """Takes an actor off the road for the rest of the episode; what it has done still counts.
 
+        One whose scenario has not begun is not there yet: then that scenario never begins.
+
         Raises:
             ChangeError: If it is not there.
         """
-        remove_actor(self._state, actor)
+        if not call_off(self._state, self._scenery.scenarios, actor):
+            remove_actor(self._state, actor)
 
     def move_actor(self, actor: int, ahead_m: float, right_m: float) -> None:
         """Sets a vehicle or a walker of the traffic down elsewhere, on a lane or way nearby.

@@ -14,7 +14,7 @@ from scenario_street import FROM_NORTH, FROM_WEST, Street
 
 from di_envs.prompt import OBSTACLES, fill_obstacles
 from di_envs.town.lanes import LightState
-from di_envs.world.scenario_steps import AHEAD, DONE
+from di_envs.world.scenario_tables import AHEAD, DONE
 from di_envs.world.state import ActorKind, EventKind
 from di_envs.world.world import World, WorldConfig
 
@@ -195,6 +195,20 @@ def test_he_does_not_walk_into_the_side_of_a_car_that_stands_and_gives_up_after_
     assert street.state.kind[FIRST] == ActorKind.ABSENT
 
 
+def test_who_is_taken_away_ends_his_scenario_and_before_it_began_it_never_does():
+    street = Street((3, "", 5), (3, "", 40), seed=WALKER)
+    street.lead(0.0)
+    street.lead(5.0)
+    street.world.remove_actor(FIRST)
+    street.wait(0.1)
+    assert street.state.scenario_step.tolist() == [DONE, AHEAD]
+    street.world.remove_actor(FIRST + 2)
+    for x in range(6, 45):
+        street.lead(float(x))
+    assert (street.state.kind[FIRST:] == ActorKind.ABSENT).all()
+    assert len(of_kind(street.events, EventKind.SCENARIO)) == 1
+
+
 def test_he_is_told_in_the_prompt_and_the_machine_is_not():
     street = Street((3, "", 5), seed=WALKER)
     street.lead(0.0)
@@ -312,7 +326,7 @@ def test_an_ego_that_never_goes_loses_its_lights_after_three_minutes():
 
 def test_an_ego_that_is_taken_away_gives_its_lights_back():
     street = at_the_line()
-    street.world.remove_ego(0)
+    street.world.remove_actor(0)
     street.wait(0.05)
     assert (street.state.held_by[0], street.state.scenario_step[0]) == (0, DONE)
 

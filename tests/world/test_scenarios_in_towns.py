@@ -15,7 +15,7 @@ from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan, ScenarioTrigger
 from di_envs.town.queries import nearest_driving_lane_towards
-from di_envs.world.scenario_steps import AHEAD, DONE
+from di_envs.world.scenario_tables import AHEAD, DONE
 from di_envs.world.state import ActorKind, EventKind, State
 from di_envs.world.world import World, WorldConfig
 
@@ -128,6 +128,6 @@ def test_a_drive_through_all_scenarios_leaves_traffic_whole_and_moving(route, se
     assert (state.forced_light == 0).all()
     slots = state.kind[world.view.capacity.first_scenario_actor :]
     assert (slots == ActorKind.ABSENT).all()
-    world.remove_ego(0)
+    world.remove_actor(0)
     world.advance(STANDING, 4000)
     assert int(state.still_ticks[1:121].max()) * 0.05 < 120.0
