@@ -110,6 +110,7 @@ class World:
         self._walk = build_walk_graph(town)
         self._ego_model = EgoModel().parameters()
         self._view: WorldView | None = None
+        self._scenery: Scenery
 
     def twin(self) -> World:
         """Another world in the same town, without an episode; it shares the town's tables."""
