@@ -45,17 +45,25 @@ def resumed(folder: Path, run: RunRecord) -> RunRecord:
         ResultsError: If the folder holds another run, or one driven on another footing; the
             message says what differs.
     """
-    if not (folder / RECORD_FILE).exists():
-        return run
-    earlier = read_head(folder)
     written = run_from_json(json.loads(json.dumps(run_to_json(run))))  # as its file would read
-    differences = list(_differences(earlier, written))
+    differences = list(_differences(_earlier(folder) or written, written))
     if differences:
         raise ResultsError(
             f"{folder} cannot be resumed, its results would mix: {'; '.join(differences)}. Repeat "
             "the command as it was, or choose another --output"
         )
-    return dataclasses.replace(run, routes=tuple(_kept(folder, earlier)))
+    return dataclasses.replace(run, routes=tuple(_kept(folder, written)))
+
+
+def _earlier(folder: Path) -> RunRecord | None:
+    """What was asked for before; None if that cannot be read. Each route names its run, too."""
+    if not (folder / RECORD_FILE).exists():
+        return None
+    try:
+        return read_head(folder)
+    except DamagedError:
+        warnings.warn(f"{folder / RECORD_FILE} is damaged: it is written anew", stacklevel=2)
+        return None
 
 
 def _kept(folder: Path, run: RunRecord) -> Iterator[RouteRecord]:

@@ -113,7 +113,7 @@ class Evaluate(SceneArguments):
                 step_s=self.step_timeout, setup_s=self.setup_timeout, route_s=self.route_timeout
             )
         except ValueError as error:
-            raise UsageError(str(error)) from error
+            raise UsageError("--step-, --setup- and --route-timeout must be positive") from error
         if self.engine == "local":
             return LocalEngine(workers=self.workers, limits=limits)
         from leaderboard.ray_engine import RayEngine

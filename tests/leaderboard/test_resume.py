@@ -100,11 +100,14 @@ def test_a_lost_route_is_driven_after_all(whole, copy):
     assert contents(copy) == contents(whole)
 
 
-def test_a_run_file_cut_in_half_is_refused(copy):
-    path = copy / "driveinsight.json"
+def test_a_run_file_cut_in_half_is_written_anew_and_no_route_is_lost(whole, copy):
+    path, route = copy / "driveinsight.json", copy / "routes" / "0002.json"
+    before = route.stat().st_mtime_ns
     path.write_text(path.read_text()[:100])
-    with pytest.raises(ResultsError, match="not whole JSON"):
+    with pytest.warns(UserWarning, match=r"driveinsight\.json is damaged: it is written anew"):
         resumed(copy)
+    assert contents(copy) == contents(whole)
+    assert route.stat().st_mtime_ns == before
 
 
 def test_a_run_with_other_seeds_is_refused_and_left_alone(copy):
