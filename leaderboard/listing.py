@@ -7,7 +7,7 @@ from collections import Counter
 from rich.markup import escape
 from rich.table import Table
 
-from agents import AGENTS, load_agent
+from agents import AGENTS, SCHEMES, load_agent
 from di_envs.suites import Suite, load_suite, suite_names
 from di_envs.town.loading import load_town
 from di_envs.town.scenarios import STAGED
@@ -20,6 +20,17 @@ def agent_table() -> Table:
         table.add_column(column)
     for name, entry in AGENTS.items():
         table.add_row(name, _track(name), escape(entry.summary))
+    return table
+
+
+def scheme_table() -> Table:
+    """The kinds of files that hold a driver from elsewhere, and how each is named."""
+    table = Table(title="from elsewhere", title_justify="left", title_style="bold")
+    for column in ("--agent", "what it is"):
+        table.add_column(column)
+    for entry in SCHEMES.values():
+        spec, _, summary = entry.summary.partition(": ")
+        table.add_row(escape(spec), escape(summary))
     return table
 
 

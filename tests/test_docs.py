@@ -74,6 +74,7 @@ def test_the_python_of_the_page_on_agents_runs(number, tmp_path):
     code = blocks(AGENTS_PAGE, "python")[number]
     if "stable_baselines3" in code:
         pytest.importorskip("stable_baselines3", reason="needs the extra rl")
+    (tmp_path / "examples").symlink_to(TOP / "examples")
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
         capture_output=True,

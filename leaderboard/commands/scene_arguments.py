@@ -29,7 +29,7 @@ class SceneArguments:
     """Who drives where, among whom and by which rules."""
 
     agent: Annotated[str, tyro.conf.arg(metavar="AGENT")]
-    """A name (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
+    """A name or a scheme (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
 
     suite: Annotated[str | None, says("NAME")] = None
     """A shipped set of routes (see `driveinsight suites`); needless with --routes."""
