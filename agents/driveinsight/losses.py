@@ -1,0 +1,57 @@
+"""What training brings down: L1 of the waypoints, and what keeps BEV features about the scene.
+
+Source: the paper, sections 3.2 and 4.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from agents.driveinsight.model import Output
+
+# Rare classes weigh more: most cells hold nothing. In the order of `BevClass`.
+_CLASS_WEIGHTS = (0.5, 1.0, 2.0, 4.0, 4.0, 8.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossConfig:
+    """Weights of the auxiliary terms."""
+
+    semantics: float = 0.5
+    depth: float = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Targets:
+    """What the expert did and what was there.
+
+    Attributes:
+        waypoints: (B, T, 2) [m].
+        valid: (B, T) 0 or 1: where the drive went on that long.
+        semantics: (B, X, Y) `BevClass`; None where there is none.
+        depth: (B, N, h, w) index of the depth bin of each feature pixel, -1 for none.
+    """
+
+    waypoints: Tensor
+    valid: Tensor
+    semantics: Tensor | None = None
+    depth: Tensor | None = None
+
+
+def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Tensor]:
+    """The terms by name, weighted, and their sum as `total`."""
+    error = (output.waypoints - targets.waypoints).abs().sum(dim=2) * targets.valid
+    terms = {"waypoints": error.sum() / targets.valid.sum().clamp(min=1.0)}
+    if output.semantics is not None and targets.semantics is not None:
+        weights = output.semantics.new_tensor(_CLASS_WEIGHTS)
+        entropy = F.cross_entropy(output.semantics, targets.semantics.long(), weights)
+        terms["semantics"] = config.semantics * entropy
+    if output.depth is not None and targets.depth is not None:
+        logits = output.depth.flatten(0, 1)  # (B*N, D, h, w)
+        entropy = F.cross_entropy(logits, targets.depth.flatten(0, 1).long(), ignore_index=-1)
+        terms["depth"] = config.depth * entropy
+    return {**terms, "total": torch.stack(list(terms.values())).sum()}

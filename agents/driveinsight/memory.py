@@ -1,0 +1,102 @@
+"""Temporal fusion: past BEV features, brought to where the ego is now, beside the present ones.
+
+The memory bank is a value: `remember` makes a new one, and nothing is kept in the module.
+Source: the paper, section 3.2, "Temporal Fusion".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from agents.driveinsight.config import GridConfig
+from agents.driveinsight.fusion import SqueezeExcitation, conv_block
+from agents.driveinsight.taps import Tap
+
+
+@dataclass(frozen=True, kw_only=True)
+class MemoryBank:
+    """The last K frames, newest first.
+
+    Attributes:
+        features: (B, K, C, X, Y) fused BEV features; zeros where there was no frame.
+        poses: (B, K, 3) x, y [m], yaw [rad] of the ego then, in a frame that stays.
+        valid: (B, K) whether there was a frame.
+    """
+
+    features: Tensor
+    poses: Tensor
+    valid: Tensor
+
+    def remember(self, features: Tensor, pose: Tensor) -> MemoryBank:
+        """The bank with one more frame, (B, C, X, Y) at (B, 3), and without its oldest."""
+        return MemoryBank(
+            features=torch.cat([features[:, None], self.features[:, :-1]], dim=1),
+            poses=torch.cat([pose[:, None], self.poses[:, :-1]], dim=1),
+            valid=torch.cat([torch.ones_like(self.valid[:, :1]), self.valid[:, :-1]], dim=1),
+        )
+
+
+def empty_bank(batch: int, frames: int, channels: int, cells: int, *, like: Tensor) -> MemoryBank:
+    """A bank that remembers nothing, of the device and type of `like`."""
+    return MemoryBank(
+        features=like.new_zeros(batch, frames, channels, cells, cells),
+        poses=torch.zeros(batch, frames, 3, device=like.device),
+        valid=torch.zeros(batch, frames, dtype=torch.bool, device=like.device),
+    )
+
+
+def warp(features: Tensor, then: Tensor, now: Tensor, grid: GridConfig) -> Tensor:
+    """Brings features of one place to another: the world stays where it is, the grid moves.
+
+    Args:
+        features: (B, C, X, Y) seen at `then`.
+        then: (B, 3) x, y [m], yaw [rad] of the ego when they were seen, in a frame that stays.
+        now: (B, 3) where they are wanted.
+        grid: Both grids.
+
+    Returns:
+        (B, C, X, Y), bilinear between cells, zero where nothing was seen.
+    """
+    ahead, right = _cell_centres(grid, features)
+    cos, sin = now[:, 2].cos(), now[:, 2].sin()
+    x = now[:, 0, None] + cos[:, None] * ahead - sin[:, None] * right - then[:, 0, None]
+    y = now[:, 1, None] + sin[:, None] * ahead + cos[:, None] * right - then[:, 1, None]
+    cos, sin = then[:, 2, None].cos(), then[:, 2, None].sin()
+    ahead, right = cos * x + sin * y, cos * y - sin * x  # (B, X*Y), in the ego's frame of then
+    # grid_sample's first axis is the last of the map, y; -1 and 1 are the grid's edges
+    along_x = 2.0 * (ahead - grid.x_min_m) / (grid.x_max_m - grid.x_min_m) - 1.0
+    along_y = 2.0 * (right - grid.y_min_m) / (grid.y_max_m - grid.y_min_m) - 1.0
+    where = torch.stack([along_y, along_x], dim=2).view(-1, grid.cells, grid.cells, 2)
+    return F.grid_sample(features, where.to(features.dtype), align_corners=False)
+
+
+def _cell_centres(grid: GridConfig, like: Tensor) -> tuple[Tensor, Tensor]:
+    """(X*Y,) x and (X*Y,) y of the cells' centres, in the order of a flattened map."""
+    step = torch.arange(grid.cells, device=like.device, dtype=torch.float32) + 0.5
+    x = grid.x_min_m + step * grid.cell_x_m
+    y = grid.y_min_m + step * grid.cell_y_m
+    return x.repeat_interleave(grid.cells), y.repeat(grid.cells)
+
+
+class TemporalFusion(nn.Module):
+    """Present and remembered BEV features to one map."""
+
+    def __init__(self, width: int, frames: int, grid: GridConfig) -> None:
+        super().__init__()
+        self.grid, self.frames = grid, frames
+        self.reduce = conv_block(width * (1 + frames), width)
+        self.weigh = SqueezeExcitation(width)
+        self.bev = Tap()
+
+    def forward(self, features: Tensor, pose: Tensor, bank: MemoryBank) -> Tensor:
+        """(B, C, X, Y) features seen at (B, 3) `pose` to the same shape."""
+        past = [
+            warp(bank.features[:, k], bank.poses[:, k], pose, self.grid)
+            * bank.valid[:, k, None, None, None]
+            for k in range(self.frames)
+        ]
+        return self.bev(self.weigh(self.reduce(torch.cat([features, *past], dim=1))))

@@ -1,0 +1,95 @@
+"""A policy on disk: `config.json`, `weights.safetensors`, and the model card `README.md`.
+
+Weights are loaded strictly, and only into the configuration that they were saved with.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import safetensors.torch
+import torch
+from safetensors import SafetensorError
+
+from agents.driveinsight.config import FORMAT_VERSION, PolicyConfig
+from agents.driveinsight.model import Policy
+
+CONFIG_FILE = "config.json"
+WEIGHTS_FILE = "weights.safetensors"
+CARD_FILE = "README.md"
+
+
+class WeightsError(ValueError):
+    """A folder that holds no usable policy; the message says what to do."""
+
+
+def save_pretrained(policy: Policy, folder: Path, card: str) -> None:
+    """Writes a policy and its card; the folder is made.
+
+    Args:
+        policy: On any device, in any mode.
+        folder: Where to.
+        card: Markdown: data, configuration, scores, limits.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {"format_version": FORMAT_VERSION, **policy.config.to_mapping()}
+    (folder / CONFIG_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    (folder / CARD_FILE).write_text(card, encoding="utf-8")
+    weights = {
+        name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()
+    }
+    safetensors.torch.save_file(weights, folder / WEIGHTS_FILE)
+
+
+def from_pretrained(folder: Path) -> Policy:
+    """The policy of a folder, on the CPU, ready to drive.
+
+    Raises:
+        WeightsError: If a file is missing or broken, or of another format or configuration.
+    """
+    config = read_config(folder)
+    path = folder / WEIGHTS_FILE
+    if not path.is_file():
+        raise WeightsError(f"there is no {path}: give a folder that save_pretrained wrote")
+    try:
+        weights = safetensors.torch.load_file(path)
+    except (SafetensorError, OSError) as error:
+        raise WeightsError(f"{path} is not whole ({error}): fetch or train it again") from error
+    policy = Policy(config)
+    try:
+        policy.load_state_dict(weights, strict=True)
+    except RuntimeError as error:
+        first = " ".join(str(error).split("\n")[1:2]).strip()
+        raise WeightsError(
+            f"{path} does not fit {folder / CONFIG_FILE} ('{config.name}'): {first} Both must come "
+            f"from one save_pretrained."
+        ) from error
+    if not all(torch.isfinite(value).all() for value in policy.state_dict().values()):
+        raise WeightsError(f"{path} holds NaN or infinite weights: train it again")
+    return policy.eval()
+
+
+def read_config(folder: Path) -> PolicyConfig:
+    """The configuration of a folder.
+
+    Raises:
+        WeightsError: If it is missing or broken, or of another format.
+    """
+    path = folder / CONFIG_FILE
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        version = content.pop("format_version")
+    except (OSError, ValueError, KeyError, AttributeError) as error:
+        raise WeightsError(
+            f"{path} cannot be read ({error!r}): give a folder that save_pretrained wrote"
+        ) from error
+    if version != FORMAT_VERSION:
+        raise WeightsError(
+            f"{path} is of format {version}, this program reads {FORMAT_VERSION}: train again, or "
+            f"install the release that wrote it"
+        )
+    try:
+        return PolicyConfig.from_mapping(content)
+    except (ValueError, TypeError) as error:
+        raise WeightsError(f"{path} is no policy configuration: {error}") from error

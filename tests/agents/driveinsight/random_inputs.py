@@ -1,0 +1,68 @@
+"""Inputs of the right shapes with random content, for networks that need not have learnt."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from agents.driveinsight.config import TOKENS, PolicyConfig
+from agents.driveinsight.model import Inputs
+from di_envs.map_chunks import POINTS
+from di_envs.prompt import LIGHTS, MAP_POLYLINES, OBSTACLES, ROUTING_POINTS, STOP_SIGNS
+from di_envs.sensors.camera_config import rig_of
+
+
+def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int = 600) -> Inputs:
+    """Inputs for a policy of that configuration."""
+    draw = torch.Generator().manual_seed(seed)
+
+    def normal(*shape: int) -> Tensor:
+        return torch.randn(batch, *shape, generator=draw)
+
+    def table(rows: int, columns: int) -> Tensor:
+        """Rows with a valid column, about half of them valid."""
+        content = normal(rows, columns) * 10.0
+        content[..., -1] = (content[..., -1] > 0.0).float()
+        return content
+
+    prompt = {
+        "command": torch.randint(0, 7, (batch,), generator=draw),
+        "target_point": normal(3),
+        "routing": table(ROUTING_POINTS, 4),
+        "map": table(MAP_POLYLINES * POINTS, 4).unflatten(1, (MAP_POLYLINES, POINTS)),
+        "obstacles": table(OBSTACLES, 9),
+        "traffic_lights": table(LIGHTS, 5),
+        "stop_signs": table(STOP_SIGNS, 4),
+        "speed": normal(1).abs() * 5.0,
+        "speed_history": normal(4).abs() * 5.0,
+    }
+    images = points = None
+    if config.camera is not None:
+        cameras = rig_of(config.camera.rig).cameras
+        size = (batch, len(cameras), 3, cameras[0].height, cameras[0].width)
+        images = torch.randint(0, 256, size, dtype=torch.uint8, generator=draw)
+    if config.lidar is not None:
+        spread, middle = torch.tensor([8.0, 8.0, 1.0, 0.2]), torch.tensor([11.0, 0.0, 1.0, 0.5])
+        points = normal(rays, 4) * spread + middle
+    return Inputs(
+        prompt=prompt,
+        present=torch.ones(batch, len(TOKENS)),
+        images=images,
+        points=points,
+        pose=normal(3),
+    )
+
+
+def sample(inputs: Inputs, index: int) -> Inputs:
+    """One of a batch, as a batch of one."""
+
+    def one(value: Tensor | None) -> Tensor | None:
+        return None if value is None else value[index : index + 1]
+
+    return Inputs(
+        prompt={name: value[index : index + 1] for name, value in inputs.prompt.items()},
+        present=inputs.present[index : index + 1],
+        images=one(inputs.images),
+        points=one(inputs.points),
+        pose=one(inputs.pose),
+    )

@@ -1,0 +1,244 @@
+"""The whole network: shapes, independence of samples, hidden components, gradients, learning."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+import torch
+from random_inputs import random_inputs, sample
+
+from agents.driveinsight.config import (
+    CONFIGS,
+    TOKENS,
+    CameraEncoderConfig,
+    GridConfig,
+    LidarEncoderConfig,
+    PlannerConfig,
+    PolicyConfig,
+    config_named,
+)
+from agents.driveinsight.losses import LossConfig, Targets, losses
+from agents.driveinsight.model import Policy
+from agents.driveinsight.semantics import BevClass
+from agents.driveinsight.taps import editing, tap_names, watching
+from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
+
+SMALL = ["small", "small-without-cameras", "small-without-lidar", "small-prompt-only"]
+
+
+def new_policy(name):
+    torch.manual_seed(0)
+    return Policy(config_named(name))
+
+
+@pytest.fixture(scope="module")
+def small():
+    return new_policy("small").eval()
+
+
+@pytest.mark.parametrize("name", [*SMALL, "small-without-privilege"])
+def test_each_configuration_plans_eight_waypoints(name):
+    policy = new_policy(name).eval()
+    with torch.inference_mode():
+        output = policy(random_inputs(policy.config, batch=2))
+    assert output.waypoints.shape == (2, 8, 2)
+    assert (output.bev is None) == (name == "small-prompt-only")
+
+
+def test_a_batch_equals_its_samples_one_by_one(small):
+    inputs = random_inputs(small.config, batch=3)
+    with torch.inference_mode():
+        together = small(inputs).waypoints
+        for n in range(3):
+            alone = small(sample(inputs, n)).waypoints[0]
+            assert torch.allclose(together[n], alone, atol=1e-5)
+
+
+@pytest.mark.parametrize("component", TOKENS)
+def test_what_is_not_present_makes_no_difference_whatever_its_values(small, component):
+    inputs = random_inputs(small.config)
+    inputs.present[:, TOKENS.index(component)] = 0.0
+    other = random_inputs(small.config, seed=7)
+    if component == "bev":
+        changed = dataclasses.replace(inputs, images=other.images, points=other.points)
+    else:
+        prompt = {**inputs.prompt, component: other.prompt[component]}
+        changed = dataclasses.replace(inputs, prompt=prompt)
+    with torch.inference_mode():
+        assert torch.equal(small(inputs).waypoints, small(changed).waypoints)
+
+
+def test_a_component_that_is_not_present_has_the_zero_token(small):
+    inputs = random_inputs(small.config)
+    inputs.present[:, TOKENS.index("routing")] = 0.0
+    with torch.inference_mode(), watching(small, "prompt.taps.routing", "prompt.taps.map") as seen:
+        small(inputs)
+    assert not seen["prompt.taps.routing"][0].any()
+    assert seen["prompt.taps.map"][0].any()
+
+
+def test_a_policy_without_privilege_reads_no_privileged_component():
+    policy = new_policy("small-without-privilege").eval()
+    inputs = random_inputs(policy.config)
+    other = random_inputs(policy.config, seed=3).prompt
+    hidden = {name: other[name] for name in ("map", "obstacles", "traffic_lights", "stop_signs")}
+    changed = dataclasses.replace(inputs, prompt={**inputs.prompt, **hidden})
+    with torch.inference_mode():
+        assert torch.equal(policy(inputs).waypoints, policy(changed).waypoints)
+
+
+def test_memory_comes_in_and_goes_out_as_a_value(small):
+    first, second = random_inputs(small.config, seed=1), random_inputs(small.config, seed=2)
+    empty = small.empty_bank(1, like=torch.zeros(1))
+    with torch.inference_mode():
+        bank = empty.remember(small(first).bev, first.pose)
+        remembered = small(second, bank).waypoints
+        again = small(second, bank).waypoints
+        forgetful = small(second, empty).waypoints
+    assert torch.equal(remembered, again)
+    assert not torch.equal(remembered, forgetful)
+
+
+def targets_for(output, seed=0):
+    draw = torch.Generator().manual_seed(seed)
+    batch = len(output.waypoints)
+    steps = torch.rand(batch, 8, 2, generator=draw) * torch.tensor([4.0, 0.5])
+    cells = 48 if output.semantics is None else output.semantics.shape[-1]
+    semantics = torch.randint(0, len(BevClass), (batch, cells, cells), generator=draw)
+    return Targets(
+        waypoints=steps.cumsum(1),
+        valid=torch.ones(batch, 8),
+        semantics=semantics if output.semantics is not None else None,
+        depth=None
+        if output.depth is None
+        else torch.randint(-1, 24, output.depth[:, :, 0].shape, generator=draw),
+    )
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_gradients_reach_every_parameter(name):
+    policy = new_policy(name).train()
+    inputs = random_inputs(policy.config, batch=2)
+    output = policy(inputs)
+    bank = None
+    if policy.memory is not None:
+        bank = policy.empty_bank(2, like=output.bev).remember(output.bev, inputs.pose)
+        output = policy(inputs, bank)
+    losses(output, targets_for(output), LossConfig())["total"].backward()
+    without = [name for name, value in policy.named_parameters() if value.grad is None]
+    assert without == []
+    still = [n for n, v in policy.named_parameters() if not v.grad.abs().sum() > 0.0]
+    assert still == []
+
+
+TINY = PolicyConfig(
+    name="tiny",
+    grid=GridConfig(cells=16),
+    camera=CameraEncoderConfig(rig="rl", width=8, channels=16, depth_bins=24),
+    lidar=LidarEncoderConfig(voxel_m=1.2, voxel_z_m=2.0, widths=(8, 16), channels=16),
+    planner=PlannerConfig(width=48, heads=4, layers=2, bev_tokens=4),
+    bev_width=16,
+)
+
+
+@pytest.mark.slow
+def test_one_batch_can_be_learnt_by_heart_to_5_cm():
+    torch.manual_seed(0)
+    policy = Policy(TINY).train()
+    inputs = random_inputs(TINY, batch=4, rays=200)
+    with torch.no_grad():
+        targets = targets_for(policy(inputs))
+    optimiser = torch.optim.AdamW(policy.parameters(), lr=3e-3)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 300)
+    for _ in range(300):
+        optimiser.zero_grad()
+        terms = losses(policy(inputs), targets, LossConfig())
+        terms["total"].backward()
+        optimiser.step()
+        schedule.step()
+        if terms["waypoints"] < 0.05:
+            break
+    assert terms["waypoints"] < 0.05
+
+
+def test_missing_waypoints_of_a_drive_that_ended_cost_nothing(small):
+    with torch.inference_mode():
+        output = small(random_inputs(small.config))
+    targets = targets_for(output)
+    targets.valid[:, 4:] = 0.0
+    wrong = dataclasses.replace(targets, waypoints=targets.waypoints.clone())
+    wrong.waypoints[:, 4:] += 100.0
+    first, second = (losses(output, t, LossConfig())["waypoints"] for t in (targets, wrong))
+    assert torch.equal(first, second)
+
+
+def test_taps_are_named_by_their_place_and_can_be_edited(small):
+    names = tap_names(small)
+    assert {"camera.depth", "lidar.bev", "fusion.bev", "memory.bev", "waypoints"} <= set(names)
+    assert "planner.layers.0.attention.weights" in names
+    inputs = random_inputs(small.config)
+    with torch.inference_mode(), watching(small, "planner.layers.0.attention.weights") as seen:
+        plain = small(inputs).waypoints
+        with editing(small, {"bev.tokens": torch.zeros_like}):
+            edited = small(inputs).waypoints
+        after = small(inputs).waypoints
+    inputs.present[:, TOKENS.index("bev")] = 0.0
+    with torch.inference_mode():
+        assert torch.equal(edited, small(inputs).waypoints)
+    assert not torch.equal(plain, edited)
+    assert torch.equal(plain, after)
+    weights = seen["planner.layers.0.attention.weights"][0]
+    assert weights.shape == (1, 6, 1, 9 + 144)
+    assert torch.allclose(weights.sum(dim=-1), torch.ones(1, 6, 1))
+
+
+def test_an_unknown_tap_is_refused_with_a_suggestion(small):
+    unknown = r"Unknown tap 'fusion.bew'; did you mean 'fusion.bev'"
+    with pytest.raises(ValueError, match=unknown), watching(small, "fusion.bew"):
+        pass
+
+
+def test_a_policy_survives_the_way_to_disk_and_back(tmp_path, small):
+    save_pretrained(small, tmp_path, card="# A card\n")
+    loaded = from_pretrained(tmp_path)
+    assert loaded.config == small.config
+    inputs = random_inputs(small.config)
+    with torch.inference_mode():
+        assert torch.equal(loaded(inputs).waypoints, small(inputs).waypoints)
+
+
+def test_broken_or_foreign_weights_are_refused(tmp_path, small):
+    with pytest.raises(WeightsError, match=r"config\.json cannot be read"):
+        from_pretrained(tmp_path)
+    save_pretrained(small, tmp_path, card="")
+    weights = tmp_path / "weights.safetensors"
+    whole = weights.read_bytes()
+    weights.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(WeightsError, match="is not whole"):
+        from_pretrained(tmp_path)
+    save_pretrained(new_policy("small-prompt-only"), tmp_path / "other", card="")
+    weights.write_bytes((tmp_path / "other" / "weights.safetensors").read_bytes())
+    with pytest.raises(WeightsError, match=r"does not fit .*'small'"):
+        from_pretrained(tmp_path)
+    config = tmp_path / "config.json"
+    config.write_text(config.read_text().replace('"format_version": 1', '"format_version": 0'))
+    with pytest.raises(WeightsError, match="is of format 0"):
+        from_pretrained(tmp_path)
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_a_configuration_survives_the_way_through_json(name):
+    config = config_named(name)
+    assert PolicyConfig.from_mapping(config.to_mapping()) == config
+
+
+def test_wrong_configurations_are_refused_with_the_next_step():
+    with pytest.raises(
+        ValueError, match=r"Unknown policy configuration 'smal'; did you mean 'smal"
+    ):
+        config_named("smal")
+    with pytest.raises(ValueError, match=r"Unknown field of PolicyConfig 'memory_frame'; did you"):
+        PolicyConfig.from_mapping({"name": "mine", "memory_frame": 2})
+    with pytest.raises(ValueError, match="needs a camera, a LiDAR or a prompt component"):
+        PolicyConfig(name="blind", camera=None, lidar=None, prompt=())
