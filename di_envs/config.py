@@ -12,7 +12,7 @@ from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.sensors.lidar_config import SWEEP_S, LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
 
-OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar")
+OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar", "odometry")
 # In place of a tuple of groups: the name of a preset, which chooses groups and the rig.
 OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
     "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}

@@ -7,6 +7,7 @@ ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to 
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +47,8 @@ from di_envs.town.town import Town
 from di_envs.world.state import SPEED_HISTORY, ActorKind, State
 from di_envs.world.world import WorldView
 
+ODOMETRY_LIMIT_M = 1e5  # distances from the route's start are clipped to this
+
 _PI = float(np.float32(np.pi))
 _XY = (-POSITION_LIMIT_M, POSITION_LIMIT_M)
 _YAW = (-_PI, _PI)
@@ -67,6 +70,7 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
     "speed": ((), [_SPEED]),
     "speed_history": ((), [_SPEED] * SPEED_HISTORY),
     "imu": ((), [(-IMU_LIMIT, IMU_LIMIT)] * 6 + [(0.0, 2.0 * _PI)]),
+    "odometry": ((), [(-ODOMETRY_LIMIT_M, ODOMETRY_LIMIT_M)] * 2 + [_YAW]),
 }
 
 
@@ -92,6 +96,10 @@ def observation_space(
     (latitude, longitude [deg], altitude [m]; double precision, as a single one is 0.4 m coarse),
     and the speedometer, which is the prompt's `speed`.
 
+    Group `odometry`: `odometry` (3,) x ahead, y right [m], yaw of the ego in the frame of the
+    route's first point: how far it has come since the start. It carries the speed, so it is a group
+    of its own.
+
     Group `camera`: for each camera of the rig `cameras` its RGB image (H, W, 3) under its name, and
     what else the rig asks for (see `Rig`).
 
@@ -110,6 +118,8 @@ def observation_space(
             np.array([-90.0, -180.0, -1e4]), np.array([90.0, 180.0, 1e4]), dtype=np.float64
         )
         space["speed"] = _table("speed")
+    if "odometry" in groups:
+        space["odometry"] = _table("odometry")
     if "camera" in groups:
         space.update(_image_spaces(rig_of(cameras)))
     if "lidar" in groups:
@@ -216,6 +226,7 @@ class Observer:
             weather: What cameras see, one of CARLA's presets; None for ClearNoon.
         """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
+        self._with_odometry = "odometry" in groups
         self._rig = rig_of(cameras) if "camera" in groups else None
         self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
         self._half_sweeps = half_sweeps
@@ -294,8 +305,20 @@ class Observer:
                 speed_mps = float(sight.state.speed[self._ego])
                 speed_mps = min(max(speed_mps, -SPEED_LIMIT_MPS), SPEED_LIMIT_MPS)
                 observation["speed"] = np.array([speed_mps], np.float32)
+        if self._with_odometry:
+            observation["odometry"] = _odometry(sight.state, sight.route, self._ego)
         if self._cameras is not None:
             observation.update(self._cameras.observe())
         if self._lidar is not None:
             observation.update(self._lidar.observe())
         return observation
+
+
+def _odometry(state: State, route: PromptRoute, ego: int) -> NDArray[np.float32]:
+    """(3,) x, y [m], yaw [rad] of an ego in the frame of its route's first point."""
+    x, y, _, yaw = route.points[0].tolist()
+    dx, dy = float(state.x[ego]) - x, float(state.y[ego]) - y
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    turn = math.remainder(float(state.yaw[ego]) - yaw, 2.0 * math.pi)
+    place = np.clip([cos * dx + sin * dy, cos * dy - sin * dx], -ODOMETRY_LIMIT_M, ODOMETRY_LIMIT_M)
+    return np.array([*place, min(max(turn, -_PI), _PI)], np.float32)
