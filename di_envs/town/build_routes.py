@@ -75,7 +75,7 @@ def build_long(graph: RoadGraph, town: str) -> list[RouteSpec]:
     routes: list[RouteSpec] = []
     for number, goal_m in enumerate(LONG_LENGTHS_M):
         dice = random.Random(number)
-        walks = [_walk(lanes, goal_m, dice) for _ in range(WALKS_A_ROUTE)]
+        walks = [random_way(lanes, goal_m, dice) for _ in range(WALKS_A_ROUTE)]
         ranked = sorted((walk for walk in walks if walk), key=_cost_of(lanes, seen))
         for way in ranked:
             route = find_route(graph, way, str(number), town)
@@ -104,7 +104,7 @@ def _cost_of(lanes: Lanes, seen: Counter[int]) -> Callable[[Way], float]:
     return cost
 
 
-def _walk(lanes: Lanes, goal_m: float, dice: random.Random) -> Way | None:
+def random_way(lanes: Lanes, goal_m: float, dice: random.Random) -> Way | None:
     """A random drive of a given length that crosses no connector twice; None where it got stuck."""
     lane = dice.choice(streets(lanes))
     begin_m = MARGIN_M + dice.random() * 0.5 * float(lanes.length_m[lane])

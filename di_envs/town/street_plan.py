@@ -137,7 +137,15 @@ def read_plan(path: Path) -> StreetPlan:
     Raises:
         ValueError: If a key is unknown or a street names a section or junction that is not there.
     """
-    table = json.loads(path.read_text(encoding="utf-8"))
+    return plan_of(json.loads(path.read_text(encoding="utf-8")))
+
+
+def plan_of(table: Mapping[str, Any]) -> StreetPlan:
+    """The plan that a table of streets describes, as JSON has it.
+
+    Raises:
+        ValueError: If a key is unknown or a street names a section or junction that is not there.
+    """
     sections = {name: _build(CrossSection, row) for name, row in table["sections"].items()}
     values = {
         **{key: value for key, value in table.items() if key != "sections"},

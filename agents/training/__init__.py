@@ -1,0 +1,1 @@
+"""Data, training and evaluation of imitation policies: what makes the weights that are shipped."""
