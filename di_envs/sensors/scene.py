@@ -25,7 +25,7 @@ from di_envs.sensors.vehicle_shapes import DETAIL_M, PART_START, PARTS, add_acto
 from di_envs.town.town import Town
 
 ROOM = 4096  # boxes that a sensor can see at once
-_KEPT = 4  # towns whose scenes are kept
+_KEPT = 8  # towns whose scenes are kept
 _LAMP_COLOURS = np.array(
     [(0.0, 0.0, 0.0), (0.10, 1.0, 0.30), (1.0, 0.78, 0.05), (1.0, 0.06, 0.05)], np.float32
 )  # by LightState

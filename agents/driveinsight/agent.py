@@ -1,0 +1,115 @@
+"""The agent `driveinsight`: the policy's waypoints through PID controllers, and nothing else.
+
+Its memory is a value: past BEV features with their poses, and the controllers' past errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from agents.base import Control, Observation, Requirements
+from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
+from agents.driveinsight.config import PolicyConfig
+from agents.driveinsight.inputs import inputs_of
+from agents.driveinsight.memory import MemoryBank
+from agents.driveinsight.weights import from_pretrained
+from di_envs.town.plan import RoutePlan
+
+SHIPPED = Path(__file__).parent / "weights"
+CONTROL_DT_S = 0.1
+
+Frame = tuple[Tensor, Tensor]  # fused BEV features (1, C, X, Y) and the pose (1, 3) of a decision
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveInsightMemory:
+    """What the policy and its controllers remember.
+
+    Attributes:
+        frames: Of the last decisions, newest first, as far back as the memory reaches.
+        controllers: Past errors.
+    """
+
+    frames: tuple[Frame, ...] = ()
+    controllers: ControllerMemory = field(default_factory=ControllerMemory)
+
+
+class DriveInsightAgent:
+    """Drives with a trained policy.
+
+    Args:
+        weights: Folder of a policy, see `weights.save_pretrained`; None for the shipped one.
+    """
+
+    def __init__(self, *, weights: str | Path | None = None) -> None:
+        self.policy = from_pretrained(SHIPPED if weights is None else Path(weights))
+        self.requires = requirements_of(self.policy.config)
+        self._controller = WaypointControllerConfig(
+            waypoint_dt_s=self.policy.config.planner.waypoint_dt_s
+        )
+        self._every = round(self.policy.config.memory_dt_s / CONTROL_DT_S)
+
+    def start(self, plan: RoutePlan, seed: int) -> DriveInsightMemory:
+        """An empty memory: the policy knows the route by its prompt alone."""
+        return DriveInsightMemory()
+
+    def act(
+        self, observation: Observation, memory: DriveInsightMemory
+    ) -> tuple[Control, DriveInsightMemory]:
+        """One decision."""
+        config = self.policy.config
+        inputs = inputs_of(config, observation)
+        with _exactly(), torch.inference_mode():
+            output = self.policy(inputs, self._bank(memory.frames))
+        frames = memory.frames
+        if output.bev is not None and inputs.pose is not None:
+            reach = config.memory_frames * self._every
+            frames = ((output.bev, inputs.pose), *frames)[:reach]
+        control, controllers = waypoints_to_control(
+            output.waypoints[0].numpy(),
+            float(observation["speed"][0]),
+            memory.controllers,
+            self._controller,
+        )
+        return control, DriveInsightMemory(frames=frames, controllers=controllers)
+
+    def _bank(self, frames: tuple[Frame, ...]) -> MemoryBank | None:
+        """The frames that are whole multiples of the memory's step old."""
+        if not frames:
+            return None
+        bank = self.policy.empty_bank(1, like=frames[0][0])
+        for features, pose in reversed(frames[self._every - 1 :: self._every]):
+            bank = bank.remember(features, pose)
+        return bank
+
+    def close(self) -> None:
+        """There is nothing to free."""
+
+
+def requirements_of(config: PolicyConfig) -> Requirements:
+    """What a policy of that configuration needs from its environment."""
+    options: dict[str, object] = {}
+    if config.camera is not None:
+        options["cameras"] = config.camera.rig
+    if config.lidar is not None:
+        options["lidar"] = config.lidar.lidar
+    return Requirements(
+        observations=config.observations, control_dt_s=CONTROL_DT_S, options=options
+    )
+
+
+@contextmanager
+def _exactly() -> Iterator[None]:
+    """One thread: torch gives other bits for other numbers of them."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

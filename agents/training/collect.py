@@ -1,0 +1,223 @@
+"""Collects drives of the expert in training towns: states, not pictures; see `frames`.
+
+Every drive is a function of (town, number), so collecting may be stopped, gone on with, and shared
+out over any number of processes: the files are the same. Of a town the first drives are taken that
+together have the moments asked for.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import signal
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents import load_agent
+from agents.training.frames import FRAME_S, Drive, DriveLog, read_drive, write_drive
+from agents.training.towns import TownFiles, town_files
+from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.route_env import RouteEnv
+from di_envs.town.plan import RoadOption
+from di_envs.world.kinds import EventKind
+from di_envs.world.world import Event
+
+CARD_FILE = "card.json"
+STANDING_MPS = 0.1
+LEAST_MOMENTS = 10  # of a drive that is worth keeping
+# Infractions for which the paper drops a route; the metres outside lanes come as an event too.
+FAULTS = (
+    *(EventKind.COLLISION_WALKER, EventKind.COLLISION_VEHICLE, EventKind.COLLISION_STATIC),
+    *(EventKind.RED_LIGHT, EventKind.STOP_SIGN, EventKind.OUTSIDE_LANES),
+    *(EventKind.ROUTE_DEVIATION, EventKind.BLOCKED),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveJob:
+    """One drive: the number says route and seed."""
+
+    folder: Path
+    town: str
+    number: int
+
+    @property
+    def path(self) -> Path:
+        """Where it is kept."""
+        return self.folder / self.town / f"{self.number:05d}.npz"
+
+    @property
+    def dropped_path(self) -> Path:
+        """What stands there instead when it is not worth keeping: why."""
+        return self.path.with_suffix(".dropped.json")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of a drive."""
+
+    job: DriveJob
+    moments: int  # kept, 0 for a dropped drive
+    why: str = ""
+
+
+def collect(
+    folder: Path, towns: Sequence[str], frames: int, *, workers: int = 1
+) -> Iterator[Outcome]:
+    """Drives until each town has its share of the moments; yields each drive as it is there.
+
+    Args:
+        folder: Where drives are kept; those that are there already count.
+        towns: Names of training towns.
+        frames: Moments in all.
+        workers: Processes.
+
+    Raises:
+        DriveFileError: If a file there is not whole.
+    """
+    share = -(-frames // len(towns))
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, _ignore_interrupts) as pool:
+        for town in towns:
+            yield from _collect_town(pool, folder, town, share, workers)
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _collect_town(
+    pool: ProcessPoolExecutor, folder: Path, town: str, share: int, workers: int
+) -> Iterator[Outcome]:
+    """Drives in order of their numbers, a few ahead, until the first have enough moments."""
+    jobs = (DriveJob(folder=folder, town=town, number=number) for number in range(10**6))
+    ahead = [pool.submit(drive_job, next(jobs)) for _ in range(workers)]
+    kept = 0
+    try:
+        while kept < share:
+            outcome = ahead.pop(0).result()
+            kept += outcome.moments
+            yield outcome
+            if kept < share:
+                ahead.append(pool.submit(drive_job, next(jobs)))
+    finally:
+        for future in ahead:
+            future.cancel()
+
+
+def drive_job(job: DriveJob) -> Outcome:
+    """Drives, unless that was done before, and writes the drive or why it is dropped."""
+    if job.dropped_path.exists():
+        return Outcome(job=job, moments=0, why=json.loads(job.dropped_path.read_text())["why"])
+    if job.path.exists():
+        return Outcome(job=job, moments=len(read_drive(job.path)))
+    drive, why = _drive(job)
+    if why:
+        job.dropped_path.parent.mkdir(parents=True, exist_ok=True)
+        job.dropped_path.write_text(json.dumps({"why": why}) + "\n", encoding="utf-8")
+        return Outcome(job=job, moments=0, why=why)
+    write_drive(job.path, drive)
+    return Outcome(job=job, moments=len(drive))
+
+
+@lru_cache(2)
+def _environment(town: str) -> tuple[RouteEnv, TownFiles]:
+    files = town_files(town)
+    return RouteEnv(observations=("prompt",), **files.options()), files
+
+
+def _drive(job: DriveJob) -> tuple[Drive, str]:
+    """The expert's drive, and why it is not worth keeping; empty if it is."""
+    env, _ = _environment(job.town)
+    seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
+    observation, _ = env.reset(seed=seed, options={"route": job.number % len(env.route_ids)})
+    agent = load_agent("expert")
+    memory = agent.start(env.plan, seed)
+    every = round(FRAME_S / env.config.control_dt_s)
+    log, step, over = DriveLog(view=env.view), 0, False
+    events: list[Event] = []
+    info: dict[str, Any] = {"finished": ""}
+    while not over:
+        control, memory = agent.act({**observation, "world": env.view}, memory)
+        if step % every == 0:
+            log.add(control)
+        observation, _, terminated, truncated, info = env.step(control)
+        events += info["events"]
+        over, step = terminated or truncated, step + 1
+    facts = {
+        "town": job.town,
+        "town_hash": env.world.town.content_hash,
+        "number": job.number,
+        "route_id": env.plan.route_id,
+        "seed": seed,
+        "finished": info["finished"],
+        "scenarios": _scenarios(events),
+    }
+    drive = log.drive(facts)
+    if info["finished"] == "timeout":
+        drive = without_standing_tail(drive)
+    faults = [event.kind.name.lower() for event in events if event.kind in FAULTS]
+    if faults:
+        return drive, f"infractions: {', '.join(faults)}"
+    if len(drive) < LEAST_MOMENTS:
+        return drive, f"{len(drive)} moments only"
+    return drive, ""
+
+
+def without_standing_tail(drive: Drive) -> Drive:
+    """The drive up to where it stood for good: a route that timed out ends in waiting."""
+    moving = np.flatnonzero(drive.speeds() > STANDING_MPS)
+    return drive.cut(int(moving[-1]) + 1 if len(moving) else 0)
+
+
+def _scenarios(events: Sequence[Event]) -> dict[str, int]:
+    types = Counter(str(int(e.value)) for e in events if e.kind == EventKind.SCENARIO)
+    return dict(sorted(types.items()))
+
+
+def drive_paths(folder: Path) -> list[Path]:
+    """The files of all drives that were kept, in order of town and number."""
+    return sorted(folder.glob("*/[0-9]*.npz"))
+
+
+def data_card(folder: Path) -> Mapping[str, Any]:
+    """Counts of what a folder holds: by town, by command, by scenario, and what was dropped.
+
+    Raises:
+        DriveFileError: If a file there is not whole.
+    """
+    towns, commands, scenarios = Counter[str](), Counter[str](), Counter[str]()
+    for path in drive_paths(folder):
+        drive = read_drive(path)
+        towns[path.parent.name] += len(drive)
+        scenarios.update(drive.facts["scenarios"])
+        commands.update(_commands(drive))
+    dropped = Counter[str]()
+    for path in sorted(folder.glob("*/*.dropped.json")):
+        dropped[json.loads(path.read_text())["why"]] += 1
+    return {
+        "moments": sum(towns.values()),
+        "seconds_apart": FRAME_S,
+        "drives": len(drive_paths(folder)),
+        "by_town": dict(sorted(towns.items())),
+        "by_command": dict(commands.most_common()),
+        "by_scenario": dict(sorted(scenarios.items())),
+        "dropped": dict(dropped.most_common()),
+    }
+
+
+def _commands(drive: Drive) -> Counter[str]:
+    """How many moments were driven under each command."""
+    env, _ = _environment(str(drive.facts["town"]))
+    plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])
+
+    targets = drive.whole["target_index"][:, 0]
+    options = plan.option[plan.targets[targets]]
+    return Counter(RoadOption(int(option)).name.lower() for option in options)

@@ -1,0 +1,246 @@
+"""Training samples rendered from drives: what the policy sees, and what the expert did.
+
+A sample is a short sequence of moments 0.5 s apart, so that the memory has something to remember.
+All that varies is drawn from the sample's key: weather, and how far the ego is set aside, with the
+expert's true path as the way back.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from agents.driveinsight.config import TOKENS, PolicyConfig
+from agents.driveinsight.inputs import inputs_of
+from agents.driveinsight.lift import depths_m
+from agents.driveinsight.losses import Targets
+from agents.driveinsight.model import Inputs
+from agents.training.bev_teacher import bev_semantics
+from agents.training.frames import Drive, DriveStage
+from di_envs.config import WEATHERS
+from di_envs.keyed_random import Stream, uniform
+from di_envs.observation import Observer
+from di_envs.sensors.camera_config import Rig, rig_of
+from di_envs.town.plan import RoutePlan
+from di_envs.town.town import Town
+
+FOURTEEN_WEATHERS = WEATHERS[:14]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """How samples are varied.
+
+    Attributes:
+        aside_m: The ego is set aside by up to so much to either side.
+        turn_rad: … and turned by up to so much.
+        share: Of samples that are.
+        weathers: One of them is drawn for each sample.
+    """
+
+    aside_m: float = 1.0
+    turn_rad: float = 0.15
+    share: float = 0.7
+    weathers: tuple[str, ...] = FOURTEEN_WEATHERS
+
+
+NO_VARIATION = Variation(share=0.0, weathers=("ClearNoon",))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sample:
+    """One sequence of T moments, oldest first: inputs and targets of each, batches of one."""
+
+    inputs: tuple[Inputs, ...]
+    targets: tuple[Targets, ...]
+
+
+class Renderer:
+    """Renders samples of one town with one policy's sensors. Towns are loaded once a process."""
+
+    def __init__(self, config: PolicyConfig, town: Town, plans: Sequence[RoutePlan]) -> None:
+        self.config, self._town = config, town
+        self._plans = {plan.route_id: plan for plan in plans}
+        self._rig = _with_depth(config)
+        self._stages = functools.lru_cache(64)(self._stage)
+
+    def sample(self, drive: Drive, last: int, variation: Variation, key: int) -> Sample:
+        """The moments that end at `last`.
+
+        Args:
+            drive: In this town.
+            last: The newest moment.
+            variation: How it is varied.
+            key: Of all draws: equal keys give equal samples.
+        """
+        right_m, turn_rad, weather = _drawn(variation, key)
+        stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
+        observer.weather = weather
+        first = max(last - self.config.memory_frames, 0)
+        inputs, targets = [], []
+        for moment in range(first, last + 1):
+            stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
+            if moment == first:
+                observer.start(stage.view)
+            observation = observer.observe()
+            inputs.append(inputs_of(self.config, observation))
+            targets.append(self._targets(drive, moment, stage, observation))
+        return Sample(inputs=tuple(inputs), targets=tuple(targets))
+
+    def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
+        plan = self._plans[route_id]
+        lidar = self.config.lidar.lidar if self.config.lidar else "paper"
+        observer = Observer(
+            self._town,
+            self.config.observations,
+            cameras=self._rig or "small",
+            lidar=lidar,
+        )
+        return DriveStage(self._town, plan, capacity), observer
+
+    def _targets(
+        self, drive: Drive, moment: int, stage: DriveStage, observation: dict[str, Any]
+    ) -> Targets:
+        state = stage.view.state
+        pose = np.array([state.x[0], state.y[0], state.yaw[0]])
+        waypoints, valid = expert_waypoints(drive, moment, self.config.planner.waypoints, pose)
+        semantics = depth = None
+        if self.config.sensors:
+            truth = bev_semantics(stage.view, self.config.grid)
+            semantics = torch.from_numpy(truth)[None]
+        if self._rig is not None:
+            images = [observation[f"{camera.name}_depth"] for camera in self._rig.cameras]
+            depth = torch.from_numpy(_depth_bins(self.config, images))[None]
+        return Targets(
+            waypoints=torch.from_numpy(waypoints)[None],
+            valid=torch.from_numpy(valid)[None],
+            semantics=semantics,
+            depth=depth,
+        )
+
+
+def _drawn(variation: Variation, key: int) -> tuple[float, float, str]:
+    """How far aside, how far turned, and in which weather."""
+    draws = [float(uniform(key, int(Stream.AGENT), k, 0)) for k in range(4)]
+    weather = variation.weathers[int(draws[3] * len(variation.weathers))]
+    if draws[0] >= variation.share:
+        return 0.0, 0.0, weather
+    aside = (2.0 * draws[1] - 1.0) * variation.aside_m
+    return aside, (2.0 * draws[2] - 1.0) * variation.turn_rad, weather
+
+
+def expert_waypoints(
+    drive: Drive, moment: int, count: int, pose: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Where the expert was afterwards.
+
+    Args:
+        drive: The drive.
+        moment: The present one.
+        count: Number of waypoints, at the drive's own 0.5 s.
+        pose: (3,) x, y, yaw of the ego, wherever it was set.
+
+    Returns:
+        (count, 2) x ahead, y right of `pose` [m], and (count,) 1 where the drive goes on so long.
+    """
+    future = drive.poses()[moment + 1 : moment + 1 + count, :2] - pose[:2]
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    waypoints, valid = np.zeros((count, 2), np.float32), np.zeros(count, np.float32)
+    known = len(future)
+    waypoints[:known, 0] = cos * future[:, 0] + sin * future[:, 1]
+    waypoints[:known, 1] = cos * future[:, 1] - sin * future[:, 0]
+    valid[:known] = 1.0
+    return waypoints, valid
+
+
+def _with_depth(config: PolicyConfig) -> Rig | None:
+    """The policy's rig, with depth images to learn depths from; None without cameras."""
+    return None if config.camera is None else replace(rig_of(config.camera.rig), depth=True)
+
+
+def _depth_bins(config: PolicyConfig, images: Sequence[NDArray[np.float32]]) -> NDArray[np.int64]:
+    """(N, h, w) the nearest depth bin at the centre of each feature pixel; -1 out of range."""
+    camera = config.camera
+    assert camera is not None
+    depths = depths_m(camera)
+    step = depths[1] - depths[0]
+    half = camera.stride // 2
+    centres = np.stack([image[half :: camera.stride, half :: camera.stride] for image in images])
+    bins = np.rint((centres - depths[0]) / step).astype(np.int64)
+    return np.where((bins >= 0) & (bins < len(depths)), bins, -1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Samples side by side: T moments of B samples, and where a sample begins.
+
+    Attributes:
+        inputs: Of each moment.
+        targets: Of each moment.
+        begun: (T, B) 0 where the sample has no such moment: it repeats its first.
+    """
+
+    inputs: tuple[Inputs, ...]
+    targets: tuple[Targets, ...]
+    begun: Tensor
+
+
+def batch_of(samples: Sequence[Sample]) -> Batch:
+    """Puts samples side by side; shorter ones repeat their first moment, which does not count."""
+    length = max(len(sample.inputs) for sample in samples)
+    inputs, targets, begun = [], [], torch.ones(length, len(samples))
+    for t in range(length):
+        places = [t - (length - len(sample.inputs)) for sample in samples]
+        begun[t] = torch.tensor([float(place >= 0) for place in places])
+        chosen = [max(place, 0) for place in places]
+        pairs = list(zip(samples, chosen, strict=True))
+        inputs.append(_joined_inputs([sample.inputs[place] for sample, place in pairs]))
+        joined = _joined_targets([sample.targets[place] for sample, place in pairs])
+        targets.append(replace(joined, valid=joined.valid * begun[t][:, None]))
+    return Batch(inputs=tuple(inputs), targets=tuple(targets), begun=begun)
+
+
+def _joined(parts: Sequence[Tensor | None]) -> Tensor | None:
+    kept = [part for part in parts if part is not None]
+    return torch.cat(kept) if kept else None
+
+
+def _joined_inputs(parts: Sequence[Inputs]) -> Inputs:
+    return Inputs(
+        prompt={name: torch.cat([part.prompt[name] for part in parts]) for name in parts[0].prompt},
+        present=torch.cat([part.present for part in parts]),
+        images=_joined([part.images for part in parts]),
+        points=_joined([part.points for part in parts]),
+        pose=_joined([part.pose for part in parts]),
+    )
+
+
+def _joined_targets(parts: Sequence[Targets]) -> Targets:
+    return Targets(
+        waypoints=torch.cat([part.waypoints for part in parts]),
+        valid=torch.cat([part.valid for part in parts]),
+        semantics=_joined([part.semantics for part in parts]),
+        depth=_joined([part.depth for part in parts]),
+    )
+
+
+def hidden_components(config: PolicyConfig, batch: int, key: int) -> Tensor:
+    """(B, 10) 0 where training hides a component of a sample, by the rates of the config."""
+    rates = np.array([config.planner.dropout.get(name, 0.0) for name in TOKENS])
+    draws = np.array(
+        [
+            [
+                float(uniform(key, int(Stream.AGENT), n, component))
+                for component in range(len(TOKENS))
+            ]
+            for n in range(batch)
+        ]
+    )
+    return torch.from_numpy((draws >= rates).astype(np.float32))
