@@ -1,7 +1,7 @@
 """The seven towns that policies are trained in; Town05 is not among them, nor anything like it.
 
 Their styles are those of CARLA's other towns. Maps, routes and triggers are made when they are
-first wanted, kept in the user's cache folder, and are the same files everywhere: all draws are keyed
+first wanted, kept in the user's cache folder, and the same everywhere: all draws are keyed
 by the town's name.
 """
 
