@@ -103,10 +103,10 @@ def _drive(
 ) -> None:
     """Lets the agent drive until the environment says that the route is over."""
     view: WorldView = env.unwrapped.view
+    log.hashes.add_observation(observation)
     agent, memory = _start(new_agent, requires, view.plans[view.ego], job)
     try:
         extras = extra_keys(agent.requires, view)
-        log.hashes.add_observation(observation)
         over = False
         while not over:
             seen = {**observation, **extras} if extras else observation

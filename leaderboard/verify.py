@@ -122,7 +122,7 @@ def verify_route(run: RunRecord, record: RouteRecord, env: RouteEnv) -> RouteVer
     except ReplayError as error:
         return RouteVerdict(record=record, problems=(str(error),))
     unchecked = _NOT_REPLAYED | (frozenset() if _shows_the_agents(env, run) else _SEEN)
-    problems = list(_differences(record, found, unchecked))
+    problems = [*_check_problems(record), *_differences(record, found, unchecked)]
     if len(problems) > _SHOWN_PROBLEMS:
         more = len(problems) - _SHOWN_PROBLEMS
         problems = [*problems[:_SHOWN_PROBLEMS], f"and {more} more"]
@@ -150,6 +150,17 @@ def replayed_record(run: RunRecord, record: RouteRecord, env: RouteEnv) -> Route
         raise ReplayError(f"the route was driven to its end, yet its status is '{record.status}'")
     job = Job(index=record.index, route_id=record.route_id, seed=record.seed)
     return route_record(step.view, job, rules_named(run.rules), log, fault=fault)
+
+
+def _check_problems(record: RouteRecord) -> Iterator[str]:
+    """What can be told of the observations' hashes without making the observations again."""
+    try:
+        count = len(record.check_array())
+    except ValueError as error:
+        yield f"observation_checks cannot be read: {error}"
+        return
+    if count != record.steps + 1:
+        yield f"there are {count} observation_checks for {record.steps} decisions"
 
 
 def _shows_the_agents(env: RouteEnv, run: RunRecord) -> bool:

@@ -6,6 +6,7 @@ import io
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,6 +92,11 @@ ALTERED = {
         "steps": r.steps - 1,
     },
     "seed": lambda r: {"seed": r.seed + 1},
+    "checks of observations": lambda r: {
+        "observation_checks": r.observation_checks[:40]
+        + ("0" if r.observation_checks[40] != "0" else "1")
+        + r.observation_checks[41:]
+    },
 }
 
 
@@ -128,6 +134,16 @@ def test_a_route_that_the_agent_failed_half_way_can_be_verified(run, env):
     assert claim.game_s == 2.0
     assert claim.score.route_completion < record.score.route_completion
     assert verify_route(run, claim, env).stands
+
+
+@pytest.mark.parametrize("name", ["FailsAtStart", "Raises", "ReturnsNan"])
+def test_what_an_agent_had_driven_before_it_failed_can_be_verified(name, tmp_path, capsys):
+    agent = f"{Path(__file__).with_name('misbehaving.py')}:{name}"
+    spec = RunSpec(agent=agent, options={**BUSY, "traffic": 0, "walkers": 0})
+    run = evaluate(spec, [0], suite=TOY, folder=tmp_path, console=Console(file=io.StringIO()))
+    assert run.routes[0].reason
+    assert main(["verify", str(tmp_path), "--observations"]) == 0
+    assert "The claim stands" in capsys.readouterr().out
 
 
 def test_a_lost_route_claims_nothing(run, folder, tmp_path):
