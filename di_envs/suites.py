@@ -234,11 +234,10 @@ def choose_suite(
             raise ValueError(f"There is no file '{path}'; check the path.")
     for path in chosen.scenario_paths:
         if not path.exists():
-            shipped = ", ".join(sorted(path.stem for path in (DATA / "scenarios").glob("*.json")))
-            raise ValueError(
-                f"There is no trigger file or folder '{path}'; check the path. Shipped: {shipped}; "
-                f"'{NO_SCENARIOS}' turns scenarios off."
-            )
+            shipped = sorted(path.stem for path in (DATA / "scenarios").glob("*.json"))
+            if path.parent == Path() and not path.suffix:
+                check_name(path.name, [*shipped, NO_SCENARIOS], "trigger file")
+            raise ValueError(f"There is no trigger file or folder '{path}'; check the path.")
     return chosen
 
 
