@@ -28,7 +28,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return lines[0]
 
 
-@pytest.mark.parametrize("command", ["evaluate", "show"])
+@pytest.mark.parametrize("command", ["evaluate", "show", "verify", "score", "compare"])
 def test_help_teaches_by_example(command, capsys):
     with pytest.raises(SystemExit) as stopped:
         main([command, "--help"])
