@@ -23,6 +23,7 @@ from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.lists import Agents, Suites
+from leaderboard.commands.report import REPORT_HELP, Report
 from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
 from leaderboard.commands.verify import VERIFY_HELP, Verify
@@ -34,6 +35,7 @@ First steps:
   driveinsight suites                                     where
   driveinsight evaluate --agent expert --suite town05_tiny
   driveinsight show results/expert-town05_tiny            the table again
+  driveinsight report results/expert-town05_tiny          a page with a replay of each route
   driveinsight verify results/expert-town05_tiny          does the claim stand?
   driveinsight drive --agent expert --suite town05_tiny --video out.mp4"""
 
@@ -41,6 +43,7 @@ Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_HELP)]
     | Annotated[Drive, tyro.conf.subcommand("drive", description=DRIVE_HELP)]
     | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_HELP)]
+    | Annotated[Report, tyro.conf.subcommand("report", description=REPORT_HELP)]
     | Annotated[Verify, tyro.conf.subcommand("verify", description=VERIFY_HELP)]
     | Annotated[ScoreByRules, tyro.conf.subcommand("score", description=SCORE_HELP)]
     | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]

@@ -83,15 +83,15 @@ def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
     """DS, RC, IS, bound, infractions per km and a summary, over the seeds of one route."""
     driven = [record for record in records if not record.lost]
     if not driven:
-        return ["-"] * 5 + [escape(_summary(records, rules_named(run.rules)))]
+        return ["-"] * 5 + [escape(summary(records, rules_named(run.rules)))]
     scores = [record.score for record in driven]
     return [
         f"{_mean([score.driving_score for score in scores]):.1f}",
         f"{_mean([score.route_completion for score in scores]):.1f}",
         f"{_mean([score.infraction_score for score in scores]):.2f}",
         _bound_cell(driven),
-        f"{_scored_per_km(driven, run):.2f}",
-        escape(_summary(records, rules_named(run.rules))),
+        f"{scored_per_km(driven, run):.2f}",
+        escape(summary(records, rules_named(run.rules))),
     ]
 
 
@@ -106,7 +106,7 @@ def _mean_cells(run: RunRecord) -> list[str]:
         str(completion),
         penalty_text,
         _bound_cell(run.scored),
-        f"{_scored_per_km(run.scored, run):.2f}",
+        f"{scored_per_km(run.scored, run):.2f}",
         "",
     ]
 
@@ -131,14 +131,14 @@ def _mean(values: Sequence[float]) -> float:
     return math.fsum(values) / len(values)
 
 
-def _scored_per_km(records: Sequence[RouteRecord], run: RunRecord) -> float:
+def scored_per_km(records: Sequence[RouteRecord], run: RunRecord) -> float:
     """Infractions that lower IS, per kilometre driven, over all these records together."""
     rules = rules_named(run.rules)
     count = sum(event.kind in rules.scored for record in records for event in record.events)
     return infractions_per_km(count, math.fsum(record.done_m for record in records))
 
 
-def _summary(records: Sequence[RouteRecord], rules: Rules) -> str:
+def summary(records: Sequence[RouteRecord], rules: Rules) -> str:
     """What went wrong, counted: `2 red light, 1 timeout, 1 agent crashed`."""
     driven = [record for record in records if not record.lost]
     kinds = count_infractions((event.kind for r in driven for event in r.events), rules)

@@ -1,0 +1,312 @@
+"""A run as one HTML file: tables, all infractions on the map, and a replay of each route.
+
+The file holds everything it needs, asks for nothing else, and is readable without its script.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from di_envs.route_env import RouteEnv
+from di_envs.town.town import Town
+from di_envs.world.kinds import ActorKind
+from di_envs.world.state import TICK_S
+from leaderboard.footing import footing_differences, footing_here, footing_of
+from leaderboard.pages.blocks import write_block
+from leaderboard.pages.film import Film, film_of
+from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
+from leaderboard.pages.report_tables import (
+    event_table,
+    event_text,
+    facts_table,
+    met,
+    route_table,
+    shown_events,
+    summary_cards,
+)
+from leaderboard.pages.town_svg import CM, line_path, simplified, town_bounds, town_svg
+from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env
+
+PAGE_FORMAT, PAGE_VERSION = "driveinsight-report", 1
+SCRIPTS = (
+    *("blocks.js", "film.js", "town.js", "scene.js", "player.js"),
+    *("tables.js", "overview.js", "report.js"),
+)
+AGREES_M = 0.002  # a trace is written to the millimetre
+
+
+class ReportError(Exception):
+    """A page that cannot be made; the message says what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteFilm:
+    """A route of the page: its record, and its packed film or why there is none."""
+
+    record: RouteRecord
+    block: str = ""
+    problem: str = ""
+
+
+def chosen_routes(run: RunRecord, route_ids: Sequence[str]) -> tuple[RouteRecord, ...]:
+    """The records of some routes, or of all where no id is given.
+
+    Raises:
+        ReportError: If the run has no such route, or no route at all.
+    """
+    known = list(dict.fromkeys(record.route_id for record in run.routes))
+    if not known:
+        raise ReportError("no route of the run is finished yet: there is nothing to report")
+    for route_id in route_ids:
+        if route_id not in known:
+            raise ReportError(f"the run has no route {route_id}; it has: {', '.join(known)}")
+    wanted = set(route_ids) or set(known)
+    return tuple(record for record in run.routes if record.route_id in wanted)
+
+
+def film_routes(
+    run: RunRecord,
+    records: Sequence[RouteRecord],
+    env: RouteEnv,
+    on_route: Callable[[RouteFilm], None] = lambda film: None,
+) -> list[RouteFilm]:
+    """Replays routes and packs what is seen; one that cannot be replayed says why.
+
+    Args:
+        run: The run.
+        records: Routes of it.
+        env: From `replay_env(run)`.
+        on_route: Called with each as it is done.
+    """
+    films = []
+    for record in records:
+        films.append(_film_route(run, record, env))
+        on_route(films[-1])
+    return films
+
+
+def _film_route(run: RunRecord, record: RouteRecord, env: RouteEnv) -> RouteFilm:
+    if record.lost:
+        return RouteFilm(record=record, problem=f"lost ({record.status}): {record.reason}")
+    try:
+        film = film_of(_checked(replay(run, record, env=env), record), env.config.control_dt_s)
+    except ReplayError as error:
+        return RouteFilm(record=record, problem=f"cannot be replayed here: {error}")
+    return RouteFilm(record=record, block=write_block(film_meta(film, record), film.columns()))
+
+
+def film_meta(film: Film, record: RouteRecord) -> dict[str, Any]:
+    """What a page's player is to know of a film beside its columns."""
+    return {
+        "route": record.route_id,
+        "seed": record.seed,
+        "tick_s": TICK_S,
+        "length_m": record.length_m,
+        "kinds": [kind.name.lower() for kind in ActorKind],
+        "moments": film.moments,
+    }
+
+
+def _checked(steps: Iterator[ReplayStep], record: RouteRecord) -> Iterator[ReplayStep]:
+    """The steps of a replay, as long as they go where the record says that the ego was."""
+    wanted = {row[0]: np.array(row[1:4]) for row in record.trace}
+    for step in steps:
+        place = wanted.pop(step.time_s, None)
+        if place is not None:
+            state, ego = step.view.state, step.view.ego
+            here = np.array([state.x[ego], state.y[ego], state.z[ego]])
+            if not np.abs(here - place).max() < AGREES_M:
+                raise ReplayError(
+                    f"at {step.time_s:g} s the replay is {math.dist(here, place):.3f} m from where "
+                    "the record was; `driveinsight verify` says what differs"
+                )
+        yield step
+
+
+def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
+    """The page's text.
+
+    Args:
+        run: The run.
+        films: Its routes that the page is about.
+        town: Where they lead through.
+    """
+    records = [film.record for film in films]
+    shown = {film.record.index for film in films if film.block}
+    title = f"{run.agent} on {run.suite}"
+    return Template(static_text("report.html")).substitute(
+        title=joined([title]),
+        subtitle=joined([f"track {run.track} · rules {run.rules} · {run.town}"]),
+        style=static_text("style.css"),
+        notes=joined(element("p", note, class_="note") for note in _notes(run, films)),
+        cards=summary_cards(run, records),
+        routes=route_table(run, records, shown),
+        events=event_table(run, records, shown),
+        facts=facts_table(run),
+        map=_map(run, films, town),
+        head=json_script("report", _head(run, films)),
+        blocks=joined(_block(film) for film in films if film.block),
+        scripts=joined(element("script", Markup("\n" + static_text(name))) for name in SCRIPTS),
+    )
+
+
+def write_report(path: Path, page: str) -> int:
+    """Writes the page in one step, so that there is never half of one; returns its bytes.
+
+    Raises:
+        ReportError: If it cannot be written.
+    """
+    data = page.encode()
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(data)
+        os.replace(beside, path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise ReportError(
+            f"cannot write {path} ({error.strerror}): choose another --output"
+        ) from error
+    return len(data)
+
+
+def make_report(
+    run: RunRecord,
+    route_ids: Sequence[str] = (),
+    on_route: Callable[[RouteFilm], None] = lambda film: None,
+) -> tuple[str, list[RouteFilm]]:
+    """Replays a run's routes and makes its page.
+
+    Args:
+        run: The run.
+        route_ids: Only these; all when empty.
+        on_route: Called with each as it is done.
+
+    Raises:
+        ReportError: If there is no such route, or its town is not to be had here.
+    """
+    records = chosen_routes(run, route_ids)
+    try:
+        env = replay_env(run, rules=run.rules)
+    except ReplayError as error:
+        raise ReportError(str(error)) from error
+    films = film_routes(run, records, env, on_route)
+    return report_page(run, films, env.world.town), films
+
+
+def _notes(run: RunRecord, films: Sequence[RouteFilm]) -> Iterator[str]:
+    """What a reader must know before the figures."""
+    if not run.complete:
+        yield f"Not complete: {len(run.routes)} of {run.planned} routes x seeds were driven."
+    if len(films) < len(run.routes):
+        yield f"This page is about {len(films)} of the {len(run.routes)} routes x seeds."
+    lost = sum(film.record.lost for film in films)
+    if lost:
+        yield (
+            f"{lost} routes were lost to the machinery and are in no mean: the same command with "
+            "--resume drives them."
+        )
+    differences = footing_differences(footing_here(), footing_of(run))
+    if differences:
+        yield f"Replayed on {'; '.join(differences)} in the run: bits may differ for that alone."
+    for film in films:
+        if film.problem and not film.record.lost:
+            yield f"Route {film.record.route_id}, seed {film.record.seed} {film.problem}."
+    if len(run.seeds) == 1:
+        yield f"One seed ({run.seeds[0]}): no confidence interval."
+
+
+def _block(film: RouteFilm) -> Markup:
+    identity = f"block-{film.record.index}"
+    return element("script", Markup(film.block), type="text/plain", id=identity)
+
+
+def _head(run: RunRecord, films: Sequence[RouteFilm]) -> dict[str, Any]:
+    """What the script knows of the routes before it unpacks one."""
+    return {
+        "format": PAGE_FORMAT,
+        "version": PAGE_VERSION,
+        "routes": [_route_head(run, film) for film in films],
+    }
+
+
+def _route_head(run: RunRecord, film: RouteFilm) -> dict[str, Any]:
+    record = film.record
+    counted = set(shown_events(record, run))
+    return {
+        "block": f"block-{record.index}" if film.block else None,
+        "route": record.route_id,
+        "seed": record.seed,
+        "status": record.status,
+        "problem": film.problem,
+        "driving_score": record.score.driving_score,
+        "game_s": record.game_s,
+        "events": [
+            {
+                "time_s": event.time_s,
+                "kind": event.kind.name.lower(),
+                "text": event_text(event),
+                "with": met(event),
+                "x": round(event.x, 2),
+                "y": round(event.y, 2),
+                "counts": event in counted,
+            }
+            for event in record.events
+        ],
+    }
+
+
+def _map(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> Markup:
+    """The town with the way of each drive and a mark for each infraction."""
+    bounds = town_bounds(town)
+    box = " ".join(f"{v * CM:.0f}" for v in (bounds.left, bounds.top, bounds.width, bounds.height))
+    marks = [mark for film in films for mark in _marks(run, film)]
+    ways = [_way(film.record) for film in films if len(film.record.trace) > 1]
+    return element(
+        "svg",
+        element("g", Markup(town_svg(town)), id="town"),
+        element("g", *ways, id="ways"),
+        element("g", *marks, id="marks"),
+        id="map",
+        viewBox=box,
+        role="group",
+        aria_label=f"Map of {town.name} with all infractions",
+        style=f"--mark: {max(bounds.width, bounds.height) * CM / 1000:.1f}",
+    )
+
+
+def _way(record: RouteRecord) -> Markup:
+    points = simplified(np.array(record.trace)[:, 1:3], 0.2)
+    name = f"route {record.route_id}, seed {record.seed}"
+    path = element("path", element("title", name), d=line_path(points))
+    return element("a", path, href=f"#route={record.route_id}&seed={record.seed}&t=0", tabindex=-1)
+
+
+def _marks(run: RunRecord, film: RouteFilm) -> Iterator[Markup]:
+    record = film.record
+    for event in shown_events(record, run):
+        kind = event.kind.name.lower()
+        met_text = f" ({met(event)})" if met(event) else ""
+        label = (
+            f"{event_text(event)}{met_text}, {event.time_s:.1f} s, "
+            f"route {record.route_id}, seed {record.seed}"
+        )
+        use = element("use", href=f"#mark-{kind}")
+        place = f"transform: translate({event.x * CM:.0f}px, {event.y * CM:.0f}px)"
+        yield element(
+            "a",
+            element("title", label),
+            element("g", use, class_=f"mark kind-{kind}"),
+            style=place,
+            href=f"#route={record.route_id}&seed={record.seed}&t={event.time_s:.2f}",
+            aria_label=label,
+        )
