@@ -17,15 +17,18 @@ import tyro
 import di_envs
 from agents import AGENTS
 from agents.base import Requirements
+from di_envs.edit_text import read_edits
 from di_envs.observation import observation_space
 from di_envs.penalties import PENALTIES
 from di_envs.reward import Standing, reward_terms
 from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
+from di_envs.world_edits import WORLD_EDITS, read_world_edits
 from leaderboard.cli import Command, Evaluate
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
+BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 README = (TOP / "README.md").read_text(encoding="utf-8")
 CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
@@ -67,6 +70,18 @@ def test_the_readmes_python_runs(number):
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_the_python_of_the_page_on_branching_runs():
+    (code,) = blocks(BRANCHING, "python")
+    exec(code, {})  # our own text
+
+
+def test_the_edits_of_the_page_on_branching_can_be_read():
+    texts = [line.split("`")[1] for line in BRANCHING.splitlines() if line.startswith("| `")]
+    named = {f"{edit.verb}:{edit.target}" for text in texts for edit in read_edits(text)}
+    assert named == set(WORLD_EDITS)
+    assert all(len(read_world_edits(text)) == 1 for text in texts)
 
 
 @pytest.mark.parametrize("number", range(len(blocks(AGENTS_PAGE, "python"))))
