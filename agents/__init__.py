@@ -45,6 +45,11 @@ AGENTS: dict[str, AgentEntry] = {
         summary="the expert that ignores traffic lights (a control for the red-light rule)",
         options={"ignore_lights": True},
     ),
+    "expert-signrunner": AgentEntry(
+        entry_point="agents.expert:Expert",
+        summary="the expert that ignores stop signs (a control for the stop-sign rule)",
+        options={"ignore_signs": True},
+    ),
     "highway": AgentEntry(
         entry_point="agents.highway:HighwayAgent",
         summary="highway-env's own IDM, MOBIL and steering controllers; knows no lights or signs",

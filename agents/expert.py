@@ -38,7 +38,8 @@ class Expert:
     Args:
         ignore_actors: Drive as if nobody else were there.
         ignore_lights: Drive as if there were no traffic lights.
-        config: Everything else; the two flags override its own.
+        ignore_signs: Drive as if there were no stop signs.
+        config: Everything else; the three flags override its own.
         model: The ego's dynamics, which its controllers invert.
     """
 
@@ -49,6 +50,7 @@ class Expert:
         *,
         ignore_actors: bool = False,
         ignore_lights: bool = False,
+        ignore_signs: bool = False,
         config: ExpertConfig | None = None,
         model: EgoModel | None = None,
     ) -> None:
@@ -56,6 +58,7 @@ class Expert:
             config or ExpertConfig(dt_s=self.requires.control_dt_s),
             ignore_actors=ignore_actors,
             ignore_lights=ignore_lights,
+            ignore_signs=ignore_signs,
         )
         self._numbers = self.config.numbers()
         self._model = (model or EgoModel()).parameters()

@@ -32,6 +32,7 @@ class ExpertNumbers(NamedTuple):
     dt_s: float
     ignore_actors: bool
     ignore_lights: bool
+    ignore_signs: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +62,7 @@ class ExpertConfig:
     dt_s: float = 0.1  # between decisions
     ignore_actors: bool = False
     ignore_lights: bool = False
+    ignore_signs: bool = False
 
     def __post_init__(self) -> None:
         for item in fields(self):

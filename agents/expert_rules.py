@@ -113,7 +113,7 @@ def line_acceleration(path, progress, lights, speed, half_length, times, queue, 
                 )
                 best = min(best, allowed)
         elif path.line_kind[q] == _STOP and not (q == progress.line and progress.stopped):
-            if line - front > -PAST_LINE_M:
+            if not numbers.ignore_signs and line - front > -PAST_LINE_M:
                 best = min(best, stop_within(line - numbers.line_margin_m - front, speed, numbers))
     return best
 
