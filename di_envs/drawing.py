@@ -45,14 +45,14 @@ def strip(points: Array, width_m: Array) -> Array:
     return np.concatenate([points[:, :2] + reach, (points[:, :2] - reach)[::-1]])
 
 
-def surfaces(lanes: Lanes, kind: LaneKind, above: bool) -> list[Array]:
+def surfaces(lanes: Lanes, kind: LaneKind, above: bool, bridge_m: float = BRIDGE_M) -> list[Array]:
     """Outlines of all lanes of a kind, above or below the level of bridges."""
     outlines = []
     for lane in np.flatnonzero(lanes.kind == kind):
         first, end = lanes.first[lane], lanes.first[lane] + lanes.count[lane]
         for begin in range(first, end - 1, PIECE):
             rows = slice(begin, min(begin + PIECE + 1, end))
-            if (lanes.points[rows, 2].mean() > BRIDGE_M) == above:
+            if (lanes.points[rows, 2].mean() > bridge_m) == above:
                 outlines.append(strip(lanes.points[rows], lanes.width_m[rows]))
     return outlines + (junction_floors(lanes, above) if kind == LaneKind.DRIVING else [])
 

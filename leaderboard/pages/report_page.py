@@ -143,9 +143,10 @@ def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
     records = [film.record for film in films]
     shown = {film.record.index for film in films if film.block}
     title = f"{run.agent} on {run.suite}"
+    seeds = f"seed{'s' if len(run.seeds) > 1 else ''} {', '.join(map(str, run.seeds))}"
     return Template(static_text("report.html")).substitute(
         title=joined([title]),
-        subtitle=joined([f"track {run.track} · rules {run.rules} · {run.town}"]),
+        subtitle=joined([f"track {run.track} · rules {run.rules} · {run.town} · {seeds}"]),
         style=static_text("style.css"),
         notes=joined(element("p", note, class_="note") for note in _notes(run, films)),
         cards=summary_cards(run, records),

@@ -21,6 +21,7 @@ from di_envs.town.town import Town
 CM = 100.0
 CELL_M = 120.0  # side of the squares
 CLOSE_M = 0.04  # how far a simplified outline may be from what it stands for
+RIM_FROM_M = BRIDGE_M + 1.5  # lower down a lane may be of the bridge and its neighbour not yet
 _LINES = {MapKind.BROKEN_LINE: "broken", MapKind.SOLID_LINE: "solid"}
 
 
@@ -108,7 +109,8 @@ def _layers(town: Town, above: bool) -> Iterator[tuple[str, list[Array]]]:
     """What there is of one level by its name, in the order in which it is laid."""
     areas = {kind: surfaces(town.lanes, kind, above) for kind in SURFACE}
     if above:
-        sides = [side for each in areas.values() for area in each for side in np.split(area, 2)]
+        high_up = (surfaces(town.lanes, kind, above, RIM_FROM_M) for kind in SURFACE)
+        sides = (side for each in high_up for area in each for side in np.split(area, 2))
         yield "rim", [simplified(side) for side in sides]
     for kind, outlines in areas.items():
         yield kind.name.lower(), [_simpler_area(outline) for outline in outlines]

@@ -9,6 +9,7 @@
   const report = JSON.parse(by_id("report").textContent);
   const films = new Map(); // by block
   let shown = null; // the route that the player shows
+  let naming = 0; // a timer
 
   di.tables.enhance(document);
   di.overview.enhance(by_id("map"));
@@ -107,6 +108,14 @@
     by_id("play").textContent = playing ? "⏸" : "▶";
     by_id("play").setAttribute("aria-label", playing ? "Pause" : "Play");
     tell_events(now.time_s);
+    clearTimeout(naming);
+    if (!playing) naming = setTimeout(name_moment, 400, now.time_s);
+  }
+
+  // Once it stands still the address names the moment, to be copied
+  function name_moment(time_s) {
+    const place = `#route=${shown.route}&seed=${shown.seed}&t=${time_s.toFixed(2)}`;
+    history.replaceState(null, "", place);
   }
 
   // What has happened is bold, and the last of it in sight

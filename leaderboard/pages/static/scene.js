@@ -8,6 +8,7 @@
 (function (di) {
   const { ABOVE, BRAKES, LEFT, RIGHT } = di.film;
   const LINES = { solid: [18, []], broken: [18, [200, 200]], rim: [90, []] };
+  const SEAM = 12; // surfaces reach that much over their edge, so that none shows between two
   const ACTORS = ["car", "van", "truck", "bus", "motorcycle", "bicycle", "walker"];
   const COLOURS = [
     ...["land", "sidewalk", "shoulder", "parking", "driving", "bar", "solid", "broken", "rim"],
@@ -46,7 +47,9 @@
       stops(context, level, window_cm, now, look);
       to_pixels();
       way(context, film, now, above, camera, look);
-      for (const actor of [...now.actors, now.ego]) {
+      const walkers = now.actors.filter((actor) => actor.kind === "walker");
+      const others = now.actors.filter((actor) => actor.kind !== "walker");
+      for (const actor of [...others, now.ego, ...walkers]) {
         if (Boolean(actor.flags & ABOVE) === Boolean(above)) body(context, actor, camera, look, now.time_s);
       }
     });
@@ -62,8 +65,10 @@
         context.setLineDash(dashes);
         context.stroke(path);
       } else {
-        context.fillStyle = look[name];
+        context.fillStyle = context.strokeStyle = look[name];
+        context.lineWidth = SEAM;
         context.fill(path);
+        if (name !== "bar") context.stroke(path);
       }
     }
     context.setLineDash([]);
@@ -100,10 +105,11 @@
     context.globalAlpha = 0.85;
     context.stroke();
     context.globalAlpha = 1;
+    const largest = 10 / camera.scale; // of a disc: so many pixels
     for (const i of targets) {
       if (i < now.route_index || Boolean(flags[i] & ABOVE) !== Boolean(above)) continue;
       const aim = i === now.target;
-      disc(context, x[i], y[i], aim ? 1.5 : 0.9, aim ? look.route : look.target, aim ? look.target : look.route);
+      disc(context, x[i], y[i], Math.min(aim ? 1.5 : 0.9, largest), aim ? look.route : look.target, aim ? look.target : look.route);
     }
     const last = x.length - 1;
     if (Boolean(flags[last] & ABOVE) === Boolean(above)) {
