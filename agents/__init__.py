@@ -28,6 +28,8 @@ class AgentEntry:
     entry_point: str  # module:Class
     summary: str
     options: Mapping[str, Any] = field(default_factory=dict)  # keyword arguments of the class
+    argument: str = "path"  # of the class, for what follows a scheme's colon
+    data: str = ""  # folder beside this file that the agent reads, such as weights
 
 
 AGENTS: dict[str, AgentEntry] = {
@@ -54,6 +56,11 @@ AGENTS: dict[str, AgentEntry] = {
         entry_point="agents.highway:HighwayAgent",
         summary="highway-env's own IDM, MOBIL and steering controllers; knows no lights or signs",
     ),
+    "driveinsight": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="the learned policy that is shipped: cameras, LiDAR and prompt to waypoints",
+        data="driveinsight/weights",
+    ),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",
@@ -70,6 +77,11 @@ SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
         entry_point="agents.carla:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
+    ),
+    "driveinsight": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="driveinsight:FOLDER: a policy that `driveinsight train` wrote",
+        argument="weights",
     ),
     "sb3": AgentEntry(
         entry_point="agents.sb3:Sb3Agent",
@@ -102,7 +114,8 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
         path, said = _place_and_options(spec, place)
-        return _make(spec, entry.entry_point, {**entry.options, "path": path, **said, **options})
+        given = {entry.argument: path, **said, **options}
+        return _make(spec, entry.entry_point, {**entry.options, **given})
     if ":" not in spec:
         raise AgentSpecError(_unknown_name(spec))
     return _make(spec, spec, options)

@@ -24,6 +24,7 @@ from agents import AgentSpecError, module_of_file
 from agents.base import Control, Observation, Requirements, make_control
 from agents.carla_formats import input_data
 from agents.carla_plan import global_plan
+from agents.one_thread import one_thread
 from di_envs.config import check_name
 from di_envs.sensors.carla_suite import LEADERBOARDS, CarlaSuite, SensorSuiteError, suite_of
 from di_envs.town.plan import RoutePlan
@@ -110,7 +111,8 @@ class CarlaAgent:
         frame = memory.decisions + 1
         data = input_data(self._suite, observation, frame, memory.origin_latitude)
         self._agent.sensor_interface.deliver(data, frame * TICK_S)
-        control = control_of(self._agent())
+        with one_thread():
+            control = control_of(self._agent())
         return control, CarlaMemory(decisions=frame, origin_latitude=memory.origin_latitude)
 
     def close(self) -> None:
@@ -233,6 +235,3 @@ def _seed_generators(seed: int) -> None:
         module = sys.modules.get(name)
         if module is not None:
             getattr(module, function)(seed % 2**32)
-    torch = sys.modules.get("torch")
-    if torch is not None:
-        torch.set_num_threads(1)  # with more, sums come out in another order

@@ -22,6 +22,7 @@ from typing import Any
 
 from agents import AgentSpecError
 from agents.base import Control, Observation, Requirements, make_control
+from agents.one_thread import one_thread
 from agents.sb3_spaces import Senses, senses_of
 from di_envs.action_forms import form_of, pedal_to_control, rescaled
 from di_envs.config import check_name
@@ -96,7 +97,8 @@ class Sb3Agent:
             else observation[name]
             for name, space in self._senses.entries.items()
         }  # fmt: skip
-        action, _ = self._model.predict(seen, deterministic=True)
+        with one_thread():
+            action, _ = self._model.predict(seen, deterministic=True)
         action = rescaled(action, self._space, self._form)
         if self._form == "waypoints":
             speed_mps = float(observation["speed"][0])
@@ -140,12 +142,10 @@ def _algorithm_of(name: str, data: Mapping[str, Any]) -> str:
 def _load(name: str, path: Path, algorithm: str) -> Any:
     try:
         import stable_baselines3
-        import torch
     except ImportError as error:
         raise AgentSpecError(
             f"agent '{name}' needs Stable-Baselines3: pip install 'driveinsight[rl]' ({error})."
         ) from error
-    torch.set_num_threads(1)
     try:
         with warnings.catch_warnings():
             # what cannot be read is only warned of, and missed much later

@@ -18,14 +18,17 @@ from typing import Annotated, Any, get_args
 import tyro
 
 from leaderboard.commands.branch import BRANCH_HELP, Branch
+from leaderboard.commands.collect import COLLECT_HELP, Collect
 from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
+from leaderboard.commands.export import EXPORT_HELP, Export
 from leaderboard.commands.lists import Agents, Suites
 from leaderboard.commands.report import REPORT_HELP, Report
 from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
+from leaderboard.commands.train import TRAIN_HELP, Train
 from leaderboard.commands.verify import VERIFY_HELP, Verify
 
 HELP = """Drive agents in closed loop and score them as the CARLA Leaderboard does.
@@ -37,7 +40,8 @@ First steps:
   driveinsight show results/expert-town05_tiny            the table again
   driveinsight report results/expert-town05_tiny          a page with a replay of each route
   driveinsight verify results/expert-town05_tiny          does the claim stand?
-  driveinsight drive --agent expert --suite town05_tiny --video out.mp4"""
+  driveinsight drive --agent expert --suite town05_tiny --video out.mp4
+  driveinsight collect                                    data to train a policy of your own"""
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_HELP)]
@@ -48,6 +52,9 @@ Command = (
     | Annotated[ScoreByRules, tyro.conf.subcommand("score", description=SCORE_HELP)]
     | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]
     | Annotated[Branch, tyro.conf.subcommand("branch", description=BRANCH_HELP)]
+    | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
+    | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
+    | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
 )

@@ -7,7 +7,7 @@ from collections import Counter
 from rich.markup import escape
 from rich.table import Table
 
-from agents import AGENTS, SCHEMES, load_agent
+from agents import AGENTS, SCHEMES, AgentSpecError, load_agent
 from di_envs.suites import Suite, load_suite, suite_names
 from di_envs.town.loading import load_town
 from di_envs.town.scenarios import STAGED
@@ -40,6 +40,8 @@ def _track(name: str) -> str:
         agent = load_agent(name)
     except ImportError as error:
         return f"needs {error.name}"
+    except AgentSpecError:
+        return "needs weights"
     try:
         return str(agent.requires.track)
     finally:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import agents
 from agents import AGENTS, SCHEMES
 from di_envs.kernels import sources_digest
 
@@ -31,12 +32,22 @@ def package_versions() -> Mapping[str, str]:
 def agent_hash(spec: str) -> str:
     """A hash of the code and the files, such as weights, that an agent's specification names."""
     parts = re.split("[:?&=]", spec)
-    if entry := AGENTS.get(spec) or SCHEMES.get(parts[0]):
+    entry = AGENTS.get(spec) or SCHEMES.get(parts[0])
+    if entry is not None:
         parts[0] = entry.entry_point.partition(":")[0]
     digest = hashlib.blake2b(digest_size=16)
-    for part in parts:
-        if Path(part).is_file():
-            digest.update(Path(part).read_bytes())
+    if entry is not None and entry.data and len(parts) == 1:
+        parts.append(str(Path(agents.__file__).parent / entry.data))
+    for part in filter(None, parts):
+        for path in _files(Path(part), folders=entry is not None):
+            digest.update(path.read_bytes())
     if all(name.isidentifier() for name in parts[0].split(".")):
         digest.update(sources_digest(parts[0]).encode())
     return digest.hexdigest()
+
+
+def _files(place: Path, *, folders: bool) -> list[Path]:
+    """A file, or those right in a folder; none where there is neither."""
+    if folders and place.is_dir():
+        return sorted(path for path in place.iterdir() if path.is_file())
+    return [place] if place.is_file() else []

@@ -5,20 +5,21 @@ Its memory is a value: past BEV features with their poses, and the controllers' 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
+from agents import AgentSpecError
 from agents.base import Control, Observation, Requirements
 from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
-from agents.driveinsight.weights import from_pretrained
+from agents.driveinsight.model import Policy
+from agents.driveinsight.weights import WeightsError, from_pretrained
+from agents.one_thread import one_thread
 from di_envs.town.plan import RoutePlan
 
 SHIPPED = Path(__file__).parent / "weights"
@@ -45,10 +46,13 @@ class DriveInsightAgent:
 
     Args:
         weights: Folder of a policy, see `weights.save_pretrained`; None for the shipped one.
+
+    Raises:
+        AgentSpecError: If the folder holds no policy, or this package comes without one.
     """
 
     def __init__(self, *, weights: str | Path | None = None) -> None:
-        self.policy = from_pretrained(SHIPPED if weights is None else Path(weights))
+        self.policy = _policy(weights)
         self.requires = requirements_of(self.policy.config)
         self._controller = WaypointControllerConfig(
             waypoint_dt_s=self.policy.config.planner.waypoint_dt_s
@@ -65,7 +69,7 @@ class DriveInsightAgent:
         """One decision."""
         config = self.policy.config
         inputs = inputs_of(config, observation)
-        with _exactly(), torch.inference_mode():
+        with one_thread(), torch.inference_mode():
             output = self.policy(inputs, self._bank(memory.frames))
         frames = memory.frames
         if output.bev is not None and inputs.pose is not None:
@@ -104,12 +108,13 @@ def requirements_of(config: PolicyConfig) -> Requirements:
     )
 
 
-@contextmanager
-def _exactly() -> Iterator[None]:
-    """One thread: torch gives other bits for other numbers of them."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
+def _policy(weights: str | Path | None) -> Policy:
+    if weights is None and not SHIPPED.is_dir():
+        raise AgentSpecError(
+            "agent 'driveinsight': this version comes without weights. Train some (docs/training.md"
+            " says how) and name their folder: driveinsight:runs/small/policy"
+        )
     try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+        return from_pretrained(SHIPPED if weights is None else Path(weights))
+    except WeightsError as error:
+        raise AgentSpecError(f"agent 'driveinsight': {error}") from error

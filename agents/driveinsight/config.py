@@ -262,6 +262,15 @@ CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
             PolicyConfig(name="small-prompt-only", camera=None, lidar=None, memory_frames=0),
             PolicyConfig(name="small-without-privilege", prompt=_NO_PRIVILEGE),
             PolicyConfig(
+                name="tiny",
+                grid=GridConfig(cells=24),
+                camera=CameraEncoderConfig(rig="rl", width=8, channels=16, depth_bins=12),
+                lidar=None,
+                planner=PlannerConfig(width=64, heads=4, layers=2, bev_tokens=6),
+                memory_frames=0,
+                bev_width=16,
+            ),
+            PolicyConfig(
                 name="paper",
                 grid=GridConfig(cells=96),
                 camera=CameraEncoderConfig(

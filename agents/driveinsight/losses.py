@@ -44,14 +44,14 @@ class Targets:
 
 def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Tensor]:
     """The terms by name, weighted, and their sum as `total`."""
-    error = (output.waypoints - targets.waypoints).abs().sum(dim=2) * targets.valid
+    error = (output.waypoints.float() - targets.waypoints).abs().sum(dim=2) * targets.valid
     terms = {"waypoints": error.sum() / targets.valid.sum().clamp(min=1.0)}
     if output.semantics is not None and targets.semantics is not None:
-        weights = output.semantics.new_tensor(_CLASS_WEIGHTS)
-        entropy = F.cross_entropy(output.semantics, targets.semantics.long(), weights)
+        weights = torch.tensor(_CLASS_WEIGHTS, device=output.semantics.device)
+        entropy = F.cross_entropy(output.semantics.float(), targets.semantics.long(), weights)
         terms["semantics"] = config.semantics * entropy
     if output.depth is not None and targets.depth is not None:
-        logits = output.depth.flatten(0, 1)  # (B*N, D, h, w)
+        logits = output.depth.float().flatten(0, 1)  # (B*N, D, h, w)
         entropy = F.cross_entropy(logits, targets.depth.flatten(0, 1).long(), ignore_index=-1)
         terms["depth"] = config.depth * entropy
     return {**terms, "total": torch.stack(list(terms.values())).sum()}

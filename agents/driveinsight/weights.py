@@ -5,6 +5,7 @@ Weights are loaded strictly, and only into the configuration that they were save
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def save_pretrained(policy: Policy, folder: Path, card: str) -> None:
     weights = {
         name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()
     }
-    safetensors.torch.save_file(weights, folder / WEIGHTS_FILE)
+    (folder / WEIGHTS_FILE).write_bytes(safetensors.torch.save(weights))
 
 
 def from_pretrained(folder: Path) -> Policy:
@@ -93,3 +94,42 @@ def read_config(folder: Path) -> PolicyConfig:
         return PolicyConfig.from_mapping(content)
     except (ValueError, TypeError) as error:
         raise WeightsError(f"{path} is no policy configuration: {error}") from error
+
+
+def weights_digest(folder: Path) -> str:
+    """A hash of the weights in a folder.
+
+    Raises:
+        WeightsError: If there are none.
+    """
+    path = folder / WEIGHTS_FILE
+    if not path.is_file():
+        raise WeightsError(f"there is no {path}: give a folder that save_pretrained wrote")
+    return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+
+
+def take_weights(policy: Policy, folder: Path) -> tuple[list[str], list[str]]:
+    """Takes over the tensors of another policy that have the same names and shapes.
+
+    The other one may be smaller: a policy that reads the prompt alone can teach its planner and its
+    encoders to one with cameras.
+
+    Args:
+        policy: That takes; the rest of it stays as it is.
+        folder: Of the other one.
+
+    Returns:
+        Names of the tensors taken, and of those of the other policy that find no place.
+
+    Raises:
+        WeightsError: If the folder holds no usable policy, or nothing in it fits.
+    """
+    theirs = from_pretrained(folder).state_dict()
+    ours = policy.state_dict()
+    fits = [n for n, value in theirs.items() if n in ours and ours[n].shape == value.shape]
+    if not fits:
+        raise WeightsError(f"nothing in {folder} has a name and shape that this policy has too")
+    with torch.no_grad():
+        for name in fits:
+            ours[name].copy_(theirs[name])
+    return fits, [name for name in theirs if name not in fits]

@@ -11,7 +11,7 @@ import json
 import multiprocessing
 import signal
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from agents import load_agent
-from agents.training.frames import FRAME_S, Drive, DriveLog, read_drive, write_drive
+from agents.training.frames import FRAME_S, Drive, DriveLog, read_drive, write_drive, write_whole
 from agents.training.towns import TownFiles, town_files
 from di_envs.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
@@ -30,6 +30,7 @@ from di_envs.world.kinds import EventKind
 from di_envs.world.world import Event
 
 CARD_FILE = "card.json"
+WEATHER_NOTE = "none: it is drawn from 14 presets whenever a moment is rendered"
 STANDING_MPS = 0.1
 LEAST_MOMENTS = 10  # of a drive that is worth keeping
 # Infractions for which the paper drops a route; the metres outside lanes come as an event too.
@@ -61,17 +62,27 @@ class DriveJob:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a drive."""
+    """What became of a drive.
+
+    Attributes:
+        job: Which it was.
+        moments: Kept; 0 for a dropped drive.
+        why: It was dropped; empty if it was not.
+        fresh: Whether it was driven now, rather than found.
+    """
 
     job: DriveJob
-    moments: int  # kept, 0 for a dropped drive
+    moments: int
     why: str = ""
+    fresh: bool = False
 
 
 def collect(
     folder: Path, towns: Sequence[str], frames: int, *, workers: int = 1
-) -> Iterator[Outcome]:
+) -> Generator[Outcome, None, None]:
     """Drives until each town has its share of the moments; yields each drive as it is there.
+
+    It may be left at any time (`close`): what is there stays, and counts the next time.
 
     Args:
         folder: Where drives are kept; those that are there already count.
@@ -82,14 +93,29 @@ def collect(
     Raises:
         DriveFileError: If a file there is not whole.
     """
-    share = -(-frames // len(towns))
+    share = share_of(frames, towns)
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _ignore_interrupts) as pool:
+    with ProcessPoolExecutor(workers, context, ignore_interrupts) as pool:
         for town in towns:
             yield from _collect_town(pool, folder, town, share, workers)
 
 
-def _ignore_interrupts() -> None:
+def share_of(frames: int, towns: Sequence[str]) -> int:
+    """The moments that each town is to have."""
+    return -(-frames // len(towns))
+
+
+def warm_up(town: str) -> None:
+    """Makes a town, and has all kernels compiled that a drive needs."""
+    env, _ = _environment(town)
+    observation, _ = env.reset(seed=0)
+    agent = load_agent("expert")
+    control, _ = agent.act({**observation, "world": env.view}, agent.start(env.plan, 0))
+    env.step(control)
+
+
+def ignore_interrupts() -> None:
+    """For worker processes: Ctrl-C is for the one that they work for."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -108,8 +134,15 @@ def _collect_town(
             if kept < share:
                 ahead.append(pool.submit(drive_job, next(jobs)))
     finally:
-        for future in ahead:
-            future.cancel()
+        running = [future for future in ahead if not future.cancel()]
+    for future in running:  # driven in vain: with fewer processes it would not be there
+        _remove(future.result())
+
+
+def _remove(outcome: Outcome) -> None:
+    if outcome.fresh:
+        outcome.job.path.unlink(missing_ok=True)
+        outcome.job.dropped_path.unlink(missing_ok=True)
 
 
 def drive_job(job: DriveJob) -> Outcome:
@@ -120,11 +153,11 @@ def drive_job(job: DriveJob) -> Outcome:
         return Outcome(job=job, moments=len(read_drive(job.path)))
     drive, why = _drive(job)
     if why:
-        job.dropped_path.parent.mkdir(parents=True, exist_ok=True)
-        job.dropped_path.write_text(json.dumps({"why": why}) + "\n", encoding="utf-8")
-        return Outcome(job=job, moments=0, why=why)
+        text = json.dumps({"why": why}) + "\n"
+        write_whole(job.dropped_path, lambda file: file.write(text.encode()))
+        return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
-    return Outcome(job=job, moments=len(drive))
+    return Outcome(job=job, moments=len(drive), fresh=True)
 
 
 @lru_cache(2)
@@ -210,6 +243,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         "by_command": dict(commands.most_common()),
         "by_scenario": dict(sorted(scenarios.items())),
         "dropped": dict(dropped.most_common()),
+        "weather": WEATHER_NOTE,
     }
 
 
@@ -217,7 +251,6 @@ def _commands(drive: Drive) -> Counter[str]:
     """How many moments were driven under each command."""
     env, _ = _environment(str(drive.facts["town"]))
     plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])
-
     targets = drive.whole["target_index"][:, 0]
     options = plan.option[plan.targets[targets]]
     return Counter(RoadOption(int(option)).name.lower() for option in options)

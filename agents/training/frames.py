@@ -13,9 +13,10 @@ import json
 import os
 import tempfile
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +171,6 @@ class DriveStage:
 
 def write_drive(path: Path, drive: Drive) -> None:
     """Writes a drive; the file is there whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     content: dict[str, Any] = {
         "format": np.array(FORMAT),
         "facts": np.array(json.dumps(drive.facts)),
@@ -181,9 +181,15 @@ def write_drive(path: Path, drive: Drive) -> None:
     }
     content |= {f"whole.{name}": values for name, values in drive.whole.items()}
     content |= {f"actors.{name}": values for name, values in drive.actors.items()}
+    write_whole(path, lambda file: np.savez_compressed(file, **content))
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
+    """Writes a file, which is there whole or not at all; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as f:
         try:
-            np.savez_compressed(f, **content)
+            write(f)
             f.flush()
             os.fsync(f.fileno())
             os.chmod(f.name, 0o644)

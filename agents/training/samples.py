@@ -24,34 +24,13 @@ from agents.driveinsight.losses import Targets
 from agents.driveinsight.model import Inputs
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import Drive, DriveStage
-from di_envs.config import WEATHERS
+from agents.training.variation import Variation, drawn
+from agents.training.waypoints import expert_waypoints
 from di_envs.keyed_random import Stream, uniform
 from di_envs.observation import Observer
 from di_envs.sensors.camera_config import Rig, rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
-
-FOURTEEN_WEATHERS = WEATHERS[:14]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Variation:
-    """How samples are varied.
-
-    Attributes:
-        aside_m: The ego is set aside by up to so much to either side.
-        turn_rad: … and turned by up to so much.
-        share: Of samples that are.
-        weathers: One of them is drawn for each sample.
-    """
-
-    aside_m: float = 1.0
-    turn_rad: float = 0.15
-    share: float = 0.7
-    weathers: tuple[str, ...] = FOURTEEN_WEATHERS
-
-
-NO_VARIATION = Variation(share=0.0, weathers=("ClearNoon",))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +59,7 @@ class Renderer:
             variation: How it is varied.
             key: Of all draws: equal keys give equal samples.
         """
-        right_m, turn_rad, weather = _drawn(variation, key)
+        right_m, turn_rad, weather = drawn(variation, key)
         stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
         observer.weather = weather
         first = max(last - self.config.memory_frames, 0)
@@ -124,40 +103,6 @@ class Renderer:
             semantics=semantics,
             depth=depth,
         )
-
-
-def _drawn(variation: Variation, key: int) -> tuple[float, float, str]:
-    """How far aside, how far turned, and in which weather."""
-    draws = [float(uniform(key, int(Stream.AGENT), k, 0)) for k in range(4)]
-    weather = variation.weathers[int(draws[3] * len(variation.weathers))]
-    if draws[0] >= variation.share:
-        return 0.0, 0.0, weather
-    aside = (2.0 * draws[1] - 1.0) * variation.aside_m
-    return aside, (2.0 * draws[2] - 1.0) * variation.turn_rad, weather
-
-
-def expert_waypoints(
-    drive: Drive, moment: int, count: int, pose: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where the expert was afterwards.
-
-    Args:
-        drive: The drive.
-        moment: The present one.
-        count: Number of waypoints, at the drive's own 0.5 s.
-        pose: (3,) x, y, yaw of the ego, wherever it was set.
-
-    Returns:
-        (count, 2) x ahead, y right of `pose` [m], and (count,) 1 where the drive goes on so long.
-    """
-    future = drive.poses()[moment + 1 : moment + 1 + count, :2] - pose[:2]
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    waypoints, valid = np.zeros((count, 2), np.float32), np.zeros(count, np.float32)
-    known = len(future)
-    waypoints[:known, 0] = cos * future[:, 0] + sin * future[:, 1]
-    waypoints[:known, 1] = cos * future[:, 1] - sin * future[:, 0]
-    valid[:known] = 1.0
-    return waypoints, valid
 
 
 def _with_depth(config: PolicyConfig) -> Rig | None:

@@ -176,11 +176,14 @@ def town_files(name: str) -> TownFiles:
     if not files.scenarios.is_file():
         folder.parent.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=folder.parent))
-        _make(TownFiles(name=name, folder=made))
         try:
+            _make(TownFiles(name=name, folder=made))
             os.replace(made, folder)
         except OSError:  # another process was faster: its files are the same
-            shutil.rmtree(made)
+            if not files.scenarios.is_file():
+                raise
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
     return files
 
 

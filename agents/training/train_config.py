@@ -1,0 +1,70 @@
+"""How a policy is trained: every number that decides what comes out, as one frozen value."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from agents.driveinsight.losses import LossConfig
+from agents.training.variation import NO_VARIATION, Variation
+
+
+class TrainingError(Exception):
+    """Training cannot begin or go on; the message says why and what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """How a policy is trained.
+
+    Attributes:
+        steps: Updates of the weights.
+        batch: Samples a step; each is a sequence of `memory_frames + 1` moments.
+        learning_rate: At its highest, after the warm-up; it falls to 0 along a cosine.
+        warm_up: Steps over which it rises.
+        weight_decay: AdamW's.
+        clip: Largest norm of the gradient.
+        seed: Of initial weights and of everything that is drawn.
+        standing_share: Of moments at which the ego stands and will stand, this share is taken.
+        overfit: Learn so many samples by heart, unvaried and with nothing hidden; 0 to learn all.
+        threads: Of torch; another number gives other bits.
+        variation: How samples are varied.
+        loss: Weights of the auxiliary terms.
+        data: Digest of the drives; see `load_moments`.
+        init_from: Digest of the weights that it began from; empty for fresh ones.
+    """
+
+    steps: int = 4000
+    batch: int = 16
+    learning_rate: float = 1e-3
+    warm_up: int = 200
+    weight_decay: float = 1e-2
+    clip: float = 5.0
+    seed: int = 0
+    standing_share: float = 0.3
+    overfit: int = 0
+    threads: int = 1
+    variation: Variation = field(default_factory=Variation)
+    loss: LossConfig = field(default_factory=LossConfig)
+    data: str = ""
+    init_from: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "batch", "threads"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
+        for name in ("overfit", "warm_up"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if not self.learning_rate > 0.0:
+            raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
+
+    @property
+    def varied(self) -> Variation:
+        """How samples are varied: not at all when they are learnt by heart."""
+        return NO_VARIATION if self.overfit else self.variation
+
+    def to_mapping(self) -> dict[str, Any]:
+        """As plain values."""
+        return dataclasses.asdict(self)

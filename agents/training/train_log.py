@@ -1,0 +1,77 @@
+"""What a training tells of itself: rows of numbers in a CSV file, and a picture of them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+Row = Mapping[str, float]
+
+
+def append_row(path: Path, row: Row) -> None:
+    """Appends a row; the first one brings the names of the columns."""
+    fresh = not path.exists()
+    with path.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        if fresh:
+            writer.writerow(row)
+        writer.writerow([_text(value) for value in row.values()])
+
+
+def read_rows(path: Path) -> list[dict[str, float]]:
+    """All rows; none if there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+
+
+def forget_rows_after(path: Path, step: int) -> None:
+    """Takes away what was written after a checkpoint: it comes again."""
+    rows = read_rows(path)
+    kept = [row for row in rows if row["step"] <= step]
+    if len(kept) < len(rows):
+        path.unlink()
+        for row in kept:
+            append_row(path, row)
+
+
+def _text(value: float) -> str:
+    return str(int(value)) if float(value).is_integer() else f"{value:.6g}"
+
+
+def write_curve(path: Path, log: list[dict[str, float]], checks: list[dict[str, float]]) -> bool:
+    """Draws loss terms over steps, and driving scores where there are any.
+
+    Args:
+        path: A PNG.
+        log: Rows with `step` and loss terms.
+        checks: Rows with `step` and `driving_score`.
+
+    Returns:
+        False without Matplotlib, or without anything to draw.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return False
+    if len(log) < 2:
+        return False
+    figure = Figure(figsize=(7.0, 3.4), layout="constrained")
+    axes = figure.add_subplot()
+    steps = [row["step"] for row in log]
+    for name in log[0]:
+        if name != "step" and name != "total":
+            axes.plot(steps, [row[name] for row in log], label=name, linewidth=1.0)
+    axes.set(xlabel="step", ylabel="loss (waypoints: m)", yscale="log")
+    axes.grid(alpha=0.3)
+    if checks:
+        beside = axes.twinx()
+        scores = [row["driving_score"] for row in checks]
+        beside.plot([row["step"] for row in checks], scores, "ko-", label="driving score")
+        beside.set(ylabel="driving score", ylim=(0.0, 100.0))
+        beside.legend(loc="lower right", frameon=False)
+    axes.legend(loc="upper right" if not checks else "upper center", frameon=False)
+    figure.savefig(path, dpi=130)
+    return True

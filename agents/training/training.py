@@ -1,0 +1,294 @@
+"""Trains a policy on collected drives: plain torch, one function a step, exact to resume.
+
+Which samples make a step, how they are varied and what is hidden in them are functions of (seed,
+step), so a run that was killed goes on from its checkpoint as if nothing had been.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import pickle
+import time
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from agents.driveinsight.config import TOKENS, PolicyConfig
+from agents.driveinsight.losses import losses
+from agents.driveinsight.model import Policy
+from agents.driveinsight.weights import save_pretrained
+from agents.training.model_card import model_card
+from agents.training.samples import Batch, hidden_components
+from agents.training.train_config import TrainConfig, TrainingError
+from agents.training.train_log import append_row, forget_rows_after, read_rows
+from di_envs.keyed_random import Stream, keyed_hash
+
+CHECKPOINT_FILE = "checkpoint.pt"
+LOG_FILE = "log.csv"
+CHECKS_FILE = "checks.csv"
+POLICY_FOLDER = "policy"
+LOG_EVERY = 20  # steps whose mean makes a row of the log
+CHECKPOINT_EVERY_S = 120.0
+
+
+@dataclass(kw_only=True)
+class Training:
+    """A policy being trained: all that a checkpoint holds."""
+
+    policy: Policy
+    optimiser: torch.optim.Optimizer
+    config: TrainConfig
+    step: int = 0
+
+    @classmethod
+    def begin(cls, policy_config: PolicyConfig, config: TrainConfig, device: str) -> Training:
+        """Fresh weights, drawn from the seed."""
+        torch.manual_seed(config.seed)
+        policy = Policy(policy_config).to(device)
+        optimiser = torch.optim.AdamW(
+            policy.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        return cls(policy=policy, optimiser=optimiser, config=config)
+
+    def save(self, path: Path) -> None:
+        """Writes a checkpoint; the old one stays until the new one is whole."""
+        part = path.with_suffix(".part")
+        torch.save(
+            {
+                "policy_config": self.policy.config.to_mapping(),
+                "config": self.config.to_mapping(),
+                "policy": self.policy.state_dict(),
+                "optimiser": self.optimiser.state_dict(),
+                "step": self.step,
+            },
+            part,
+        )
+        os.replace(part, path)
+
+    def load(self, path: Path) -> None:
+        """Goes on from a checkpoint.
+
+        Raises:
+            TrainingError: If it is not whole, or of another policy or training.
+        """
+        device = next(self.policy.parameters()).device
+        try:
+            content = torch.load(path, weights_only=True, map_location=device)
+            policy, config = content["policy_config"], content["config"]
+        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError,
+                pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
+            raise TrainingError(
+                f"{path} is not whole ({error!r}): delete it to begin again"
+            ) from error
+        different = [
+            *_differences(policy, self.policy.config.to_mapping()),
+            *_differences(config, self.config.to_mapping()),
+        ]
+        if different:
+            raise TrainingError(
+                f"{path} is of another training ({', '.join(different)}): give the same options "
+                f"to go on with it, or another --output to begin a new one"
+            )
+        self.policy.load_state_dict(content["policy"])
+        self.optimiser.load_state_dict(content["optimiser"])
+        self.step = content["step"]
+
+    def update(self, batch: Batch) -> dict[str, float]:
+        """One step on a batch; returns the terms of the loss.
+
+        Raises:
+            TrainingError: If the loss is not finite: the weights are left as they were.
+        """
+        for group in self.optimiser.param_groups:
+            group["lr"] = self._learning_rate()
+        self.policy.train()
+        self.optimiser.zero_grad()
+        total: dict[str, float] = {}
+        for terms in self._terms(batch):
+            if not torch.isfinite(terms["total"]):
+                raise self._diverged(f"loss is {float(terms['total'].detach())}")
+            (terms["total"] / len(batch.inputs)).backward()
+            for name, value in terms.items():
+                total[name] = total.get(name, 0.0) + float(value.detach()) / len(batch.inputs)
+        norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.config.clip)
+        if not torch.isfinite(norm):
+            raise self._diverged(f"gradient's norm is {float(norm)}")
+        self.optimiser.step()
+        self.step += 1
+        return total
+
+    def _diverged(self, what: str) -> TrainingError:
+        return TrainingError(
+            f"the {what} at step {self.step}: try a lower --learning-rate in another --output; the "
+            f"last checkpoint is whole"
+        )
+
+    def _learning_rate(self) -> float:
+        config = self.config
+        if self.step < config.warm_up:
+            return config.learning_rate * (self.step + 1) / config.warm_up
+        done = (self.step - config.warm_up) / max(config.steps - config.warm_up, 1)
+        return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * min(done, 1.0)))
+
+    def _hidden(self, size: int) -> Tensor:
+        """(B, 10) which components are hidden (0) in this step."""
+        if self.config.overfit:
+            return torch.ones(size, len(TOKENS))
+        key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
+        return hidden_components(self.policy.config, size, key)
+
+    def _terms(self, batch: Batch) -> Iterator[dict[str, Tensor]]:
+        """The loss of each moment; later ones remember earlier ones, without their gradients."""
+        policy, device = self.policy, next(self.policy.parameters()).device
+        size = len(batch.targets[0].waypoints)
+        hidden = self._hidden(size).to(device)
+        bank = None
+        for t, (inputs, targets) in enumerate(zip(batch.inputs, batch.targets, strict=True)):
+            inputs, targets = _to(inputs, device), _to(targets, device)
+            seen = dataclasses.replace(inputs, present=inputs.present * hidden)
+            with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+                output = policy(seen, bank)
+            yield losses(output, targets, self.config.loss)
+            if policy.memory is not None and output.bev is not None and inputs.pose is not None:
+                bank = bank or policy.empty_bank(size, like=output.bev)
+                bank = bank.remember(output.bev.detach(), inputs.pose)
+                begun = batch.begun[t].bool().to(device)
+                valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
+                bank = dataclasses.replace(bank, valid=valid)
+
+
+def _to(values: Any, device: torch.device) -> Any:
+    """A bundle of tensors on a device."""
+
+    def moved(value: Any) -> Any:
+        if isinstance(value, Tensor):
+            return value.to(device, non_blocking=True)
+        return {name: moved(item) for name, item in value.items()} if value else value
+
+    fields = dataclasses.fields(values)
+    return type(values)(**{field.name: moved(getattr(values, field.name)) for field in fields})
+
+
+def _differences(saved: Mapping[str, Any], ours: Mapping[str, Any]) -> list[str]:
+    """What was otherwise when a checkpoint was written, in words."""
+    return [
+        f"{name} was {saved.get(name, 'not there')}, is {value}"
+        for name, value in ours.items()
+        if saved.get(name, None) != value
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checks:
+    """How well the policy drives, looked at now and then; the best one is kept.
+
+    Attributes:
+        every: Steps between two checks; there is one after the last step too.
+        score: Drives with the policy; returns numbers by name, `driving_score` among them. None if
+            it was asked to stop: the check is made when the training goes on.
+    """
+
+    every: int
+    score: Callable[[Policy], Mapping[str, float] | None]
+
+
+def train(
+    training: Training,
+    data: Iterator[Batch],
+    folder: Path,
+    *,
+    on_step: Callable[[int, dict[str, float]], None] = lambda step, terms: None,
+    stop: Callable[[], bool] = lambda: False,
+    checks: Checks | None = None,
+    about_data: Mapping[str, Any] | None = None,
+) -> bool:
+    """Trains to the last step; writes checkpoints, a log and the policy on the way.
+
+    Args:
+        training: Fresh, or loaded from a checkpoint.
+        data: Batches from `training.step` on.
+        folder: For all that is written.
+        on_step: Told each step's number and loss terms.
+        stop: Asked after each step whether to stop; a checkpoint is written then.
+        checks: Drives now and then; the best policy is kept. None keeps the last one.
+        about_data: The data card, for the model card.
+
+    Returns:
+        Whether the last step was done.
+
+    Raises:
+        TrainingError: If the loss is not finite.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (LOG_FILE, CHECKS_FILE):
+        forget_rows_after(folder / name, training.step)
+    keep = _keeper(training, folder, about_data or {})
+    saved_s, sums, count, last = time.monotonic(), dict[str, float](), 0, training.config.steps
+    while True:
+        if checks and _due(training, checks, folder):
+            training.save(folder / CHECKPOINT_FILE)
+            if not _check(training, checks, folder, keep):
+                return False
+        if training.step == last or stop():
+            break
+        terms = training.update(next(data))
+        on_step(training.step, terms)
+        for name, value in terms.items():
+            sums[name] = sums.get(name, 0.0) + value
+        count += 1
+        if training.step % LOG_EVERY == 0 or training.step == last:
+            row = {name: value / count for name, value in sums.items()}
+            append_row(folder / LOG_FILE, {"step": training.step, **row})
+            sums, count = {}, 0
+            # together with a row, so that rows are the same however often a run is cut off
+            if time.monotonic() - saved_s > CHECKPOINT_EVERY_S:
+                training.save(folder / CHECKPOINT_FILE)
+                saved_s = time.monotonic()
+    training.save(folder / CHECKPOINT_FILE)
+    if training.step == last and not checks:
+        keep()
+    return training.step == last
+
+
+def _keeper(training: Training, folder: Path, about_data: Mapping[str, Any]) -> Callable[[], None]:
+    """Writes the present policy with its card."""
+
+    def keep() -> None:
+        card = model_card(
+            training.policy,
+            training.config,
+            step=training.step,
+            log=read_rows(folder / LOG_FILE),
+            checks=read_rows(folder / CHECKS_FILE),
+            about_data=about_data,
+        )
+        save_pretrained(training.policy, folder / POLICY_FOLDER, card)
+
+    return keep
+
+
+def _due(training: Training, checks: Checks, folder: Path) -> bool:
+    """Whether a check belongs here that was not made before."""
+    step = training.step
+    if step == 0 or (step % checks.every and step != training.config.steps):
+        return False
+    return all(row["step"] != step for row in read_rows(folder / CHECKS_FILE))
+
+
+def _check(training: Training, checks: Checks, folder: Path, keep: Callable[[], None]) -> bool:
+    """Drives with the present policy, and keeps it if none before drove better."""
+    before = [row["driving_score"] for row in read_rows(folder / CHECKS_FILE)]
+    found = checks.score(training.policy)
+    if found is None:
+        return False
+    append_row(folder / CHECKS_FILE, {"step": training.step, **found})
+    if found["driving_score"] >= max(before, default=0.0):
+        keep()
+    return True

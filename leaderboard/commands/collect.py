@@ -1,0 +1,128 @@
+"""`driveinsight collect`: the expert drives training towns, and its drives are kept as states."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.scene_arguments import says
+
+COLLECT_HELP = """Let the expert drive in made-up towns, and keep what it did, to train policies on.
+
+Examples:
+  driveinsight collect --frames 20000
+  driveinsight collect --towns small_grid suburb --frames 5000 --workers 2 --output data
+
+Kept are states, not pictures: about 1 kB each half second. Cameras and LiDAR are rendered from them
+while a policy is trained. Towns: small_grid, large_grid, suburb, highways, rural, downtown, mixed;
+all by default, and Town05 is not among them. After Ctrl-C the same command goes on; with more
+--frames it adds to what is there. Drives with an infraction are dropped."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collect:
+    """The arguments of `driveinsight collect`."""
+
+    frames: Annotated[int, says("N", "20000")] = 20000
+    """Moments to have in all, half a second apart; each town gets its share."""
+
+    towns: Annotated[tuple[str, ...], says("NAME ...", "all seven")] = ()
+    """Towns to drive in."""
+
+    workers: Annotated[int, says("N", "1")] = 1
+    """Processes to drive in; the files are the same for any number."""
+
+    output: Annotated[Path, says("DIR", "data")] = Path("data")
+    """Folder for the drives."""
+
+    def run(self) -> int:
+        """Collects; returns the exit code."""
+        if self.frames < 1 or self.workers < 1:
+            raise UsageError("--frames and --workers must be at least 1")
+
+        from agents.training.collect import CARD_FILE, data_card, warm_up
+        from agents.training.frames import FRAME_S, DriveFileError
+        from agents.training.towns import TRAINING_TOWNS
+        from di_envs.config import check_name
+        from leaderboard.compiling import compile_progress
+
+        towns = tuple(dict.fromkeys(self.towns or TRAINING_TOWNS))
+        try:
+            for town in towns:
+                check_name(town, TRAINING_TOWNS, "training town")
+            with compile_progress(Console(stderr=True)):
+                warm_up(towns[0])
+            complete = self._collect(towns)
+            card = data_card(self.output)
+        except (ValueError, OSError, DriveFileError) as error:
+            raise UsageError(str(error)) from error
+        text = json.dumps(card, indent=1) + "\n"
+        self.output.mkdir(parents=True, exist_ok=True)
+        (self.output / CARD_FILE).write_text(text, encoding="utf-8")
+        say(f"{card['drives']} drives with {card['moments']} moments, {FRAME_S} s apart.")
+        say(f"Weather: {card['weather']}.")
+        Console().print(card_table(card))
+        if not complete:
+            say("Stopped; what was driven is kept.", "Next: the same command again goes on")
+            return EXIT_INTERRUPTED
+        say(
+            f"Written: {self.output / CARD_FILE} and a file for each drive beside it.",
+            f"Next: driveinsight train --config small --data {self.output}",
+        )
+        return 0
+
+    def _collect(self, towns: tuple[str, ...]) -> bool:
+        """Drives; returns whether all is there."""
+        from agents.training.collect import collect, share_of
+        from leaderboard.interruption import interruptible
+        from leaderboard.work_bar import work_bar
+
+        total = share_of(self.frames, towns) * len(towns)
+        began_s, driven = time.monotonic(), 0
+        outcomes = collect(self.output, towns, self.frames, workers=self.workers)
+        with (
+            interruptible() as interruption,
+            work_bar("driving", "moments") as bar,
+            closing(outcomes),
+        ):
+            task = bar.add_task("", total=total)
+            for outcome in outcomes:
+                driven += outcome.moments if outcome.fresh else 0
+                rate = driven / (time.monotonic() - began_s)
+                about = f"{rate:.0f}/s  {outcome.job.town}"
+                bar.update(task, advance=outcome.moments, description=about)
+                if interruption.requested:
+                    return False
+        return True
+
+
+def card_table(card: Mapping[str, Any]) -> Table:
+    """What a folder of drives holds."""
+    table = Table()
+    table.add_column("of")
+    table.add_column("")
+    table.add_column("count", justify="right")
+    table.add_column("share", justify="right")
+    parts = {
+        "town": "by_town",
+        "command": "by_command",
+        "scenario": "by_scenario",
+        "dropped drives": "dropped",
+    }
+    for title, key in parts.items():
+        counts = card[key]
+        total = sum(counts.values())
+        for row, (name, count) in enumerate(counts.items()):
+            share = f"{100 * count / total:.0f} %"
+            table.add_row("" if row else title, str(name), str(count), share)
+        table.add_section()
+    return table

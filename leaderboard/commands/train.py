@@ -1,0 +1,258 @@
+"""`driveinsight train`: trains a policy on collected drives; goes on where it was stopped."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.scene_arguments import says
+
+if TYPE_CHECKING:
+    from agents.driveinsight.config import PolicyConfig
+    from agents.driveinsight.model import Policy
+    from agents.training.loading import Moments
+    from agents.training.train_config import TrainConfig
+    from agents.training.training import Checks, Training
+    from leaderboard.training_display import TrainingDisplay
+
+TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
+
+Examples:
+  driveinsight train --config tiny --steps 1500 --check-routes 2     a first try, in minutes
+  driveinsight train --config small --data data --output runs/small
+  driveinsight train --config small --init-from runs/small-prompt-only/policy
+  driveinsight train --config small --overfit 1 --steps 300          can it learn at all?
+
+Pictures are rendered while it trains, each sample in a weather of its own. Into --output go a
+checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores of routes that
+it drives on the way, and in policy/ the weights that drove best. After Ctrl-C or a crash the same
+command goes on, and comes to the same bits (on a CPU)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """The arguments of `driveinsight train`."""
+
+    config: Annotated[str, says("NAME", "small")] = "small"
+    """Configuration of the policy: tiny, small, small-prompt-only, paper, …"""
+
+    data: Annotated[Path, says("DIR", "data")] = Path("data")
+    """Folder of drives."""
+
+    output: Annotated[Path | None, says("DIR", "runs/CONFIG")] = None
+    """Folder for all that is written."""
+
+    steps: Annotated[int, says("N", "4000")] = 4000
+    """Updates of the weights."""
+
+    batch: Annotated[int, says("N", "16")] = 16
+    """Samples a step."""
+
+    learning_rate: Annotated[float, says("X", "0.001")] = 1e-3
+    """At its highest; after a warm-up it falls to 0 along a cosine."""
+
+    workers: Annotated[int | None, says("N", "cores - 1")] = None
+    """Processes that render samples; 0 renders between steps. The bits are the same."""
+
+    threads: Annotated[int, says("N", "1")] = 1
+    """Threads of torch on a CPU; another number gives other bits."""
+
+    init_from: Annotated[Path | None, says("POLICY", "fresh weights")] = None
+    """Begin with those tensors of another policy that have the same names and shapes."""
+
+    overfit: Annotated[int, says("N", "0")] = 0
+    """Learn so many moments by heart, unvaried: the loss must fall to nearly nothing."""
+
+    check_every: Annotated[int | None, says("STEPS", "a fifth of them")] = None
+    """Steps between closed-loop checks."""
+
+    check_routes: Annotated[int, says("N", "4")] = 4
+    """Routes of town05_tiny that a check drives; 0 for no checks: the last weights are kept."""
+
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Of fresh weights and of all that is drawn."""
+
+    device: Annotated[Literal["auto", "cpu", "cuda"], says("auto|cpu|cuda", "auto")] = "auto"
+    """Where to train; auto takes a GPU if there is one, in mixed precision."""
+
+    def run(self) -> int:
+        """Trains; returns the exit code."""
+        try:
+            import torch
+        except ImportError as error:
+            raise UsageError(
+                f"training needs torch: pip install 'driveinsight[policy]' ({error})"
+            ) from error
+        self._check_numbers()
+
+        from agents.driveinsight.config import config_named
+        from agents.driveinsight.weights import WeightsError
+        from agents.training.frames import DriveFileError
+        from agents.training.loading import load_moments
+        from agents.training.train_config import TrainingError
+        from leaderboard.training_check import CheckError
+
+        torch.set_num_threads(self.threads)
+        try:
+            policy, training = config_named(self.config), self._training_config()
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        try:
+            with Console(stderr=True).status("reading drives"):
+                moments = load_moments(self.data, training.standing_share)
+            training = dataclasses.replace(training, data=moments.digest)
+            return self._train(policy, training, moments)
+        except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
+            raise UsageError(str(error)) from error
+
+    def _check_numbers(self) -> None:
+        if self.check_every is not None and self.check_every < 1:
+            raise UsageError("--check-every must be at least 1; --check-routes 0 checks nothing")
+        if self.check_routes < 0 or (self.workers or 0) < 0:
+            raise UsageError("--check-routes and --workers must not be negative")
+        if self.threads < 1:
+            raise UsageError("--threads must be at least 1")
+
+    def _training_config(self) -> TrainConfig:
+        from agents.driveinsight.weights import weights_digest
+        from agents.training.train_config import TrainConfig
+
+        return TrainConfig(
+            steps=self.steps,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            warm_up=min(200, self.steps // 10),
+            seed=self.seed,
+            overfit=self.overfit,
+            threads=self.threads,
+            init_from="" if self.init_from is None else weights_digest(self.init_from),
+        )
+
+    def _train(self, policy: PolicyConfig, config: TrainConfig, moments: Moments) -> int:
+        from agents.training.collect import data_card
+        from agents.training.loading import Samples, batches
+        from agents.training.training import train
+        from leaderboard.compiling import compile_progress
+        from leaderboard.interruption import interruptible
+        from leaderboard.training_display import TrainingDisplay
+
+        folder = self.output or Path("runs") / policy.name
+        training = self._begin(policy, config, folder)
+        samples = Samples(policy, config, moments)
+        with compile_progress(Console(stderr=True)):
+            samples[training.step * config.batch]  # before several processes need the same kernels
+        workers = max((os.cpu_count() or 2) - 1, 1) if self.workers is None else self.workers
+        data = batches(samples, config.batch, first_step=training.step, workers=workers)
+        show = TrainingDisplay(done=training.step, steps=config.steps, batch=config.batch)
+        with (
+            interruptible() as interruption,
+            closing(data),
+            show,
+            self._checks(policy, config, show, lambda: interruption.requested) as checks,
+        ):
+            done = train(
+                training,
+                data,
+                folder,
+                on_step=show.step,
+                stop=lambda: interruption.requested,
+                checks=checks,
+                about_data=data_card(self.data),
+            )
+        return _tell(training, folder) if done else _tell_stopped(training)
+
+    def _begin(self, policy: PolicyConfig, config: TrainConfig, folder: Path) -> Training:
+        """A fresh training, or the one that the folder holds."""
+        import torch
+
+        from agents.driveinsight.weights import take_weights
+        from agents.training.training import CHECKPOINT_FILE, Training
+
+        device = self.device
+        if device == "auto":
+            device = "cuda" if torch.cuda.is_available() else "cpu"
+        training = Training.begin(policy, config, device)
+        if (folder / CHECKPOINT_FILE).exists():
+            training.load(folder / CHECKPOINT_FILE)
+            say(f"Goes on from step {training.step} of {folder}.")
+        elif self.init_from is not None:
+            taken, left = take_weights(training.policy, self.init_from)
+            total = len(training.policy.state_dict())
+            say(f"Taken from {self.init_from}: {len(taken)} of {total} tensors: {_parts(taken)}.")
+            if left:
+                say(f"Not taken, as nothing here has their name and shape: {_parts(left)}.")
+        return training
+
+    @contextmanager
+    def _checks(
+        self,
+        policy: PolicyConfig,
+        config: TrainConfig,
+        show: TrainingDisplay,
+        stop: Callable[[], bool],
+    ) -> Iterator[Checks | None]:
+        from agents.training.training import Checks
+        from leaderboard.training_check import ClosedLoopCheck
+
+        if not self.check_routes or self.overfit:
+            yield None
+            return
+        every = self.check_every or max(config.steps // 5, 1)
+        with (
+            TemporaryDirectory(prefix="driveinsight-") as folder,
+            ClosedLoopCheck(
+                policy, Path(folder), self.check_routes, stop=stop, on_route=show.route
+            ) as check,
+        ):
+
+            def score(policy: Policy) -> Mapping[str, float] | None:
+                found = check(policy)
+                if found is not None:
+                    show.checked(found["driving_score"])
+                return found
+
+            yield Checks(every=every, score=score)
+
+
+def _parts(names: Sequence[str]) -> str:
+    """The parts of a network that tensors belong to, with how many are of each."""
+    counts = Counter(name.partition(".")[0] for name in names)
+    return ", ".join(f"{part} ({count})" for part, count in counts.items())
+
+
+def _tell_stopped(training: Training) -> int:
+    say(
+        f"Stopped at step {training.step} of {training.config.steps}; a checkpoint is written.",
+        "Next: the same command again goes on",
+    )
+    return EXIT_INTERRUPTED
+
+
+def _tell(training: Training, folder: Path) -> int:
+    from agents.training.train_log import read_rows, write_curve
+    from agents.training.training import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
+
+    log, checked = read_rows(folder / LOG_FILE), read_rows(folder / CHECKS_FILE)
+    curve = folder / "curve.png"
+    drawn = write_curve(curve, log, checked)
+    say(f"Trained {training.step} steps; waypoint loss {log[-1]['waypoints']:.3f} m at the end.")
+    if checked:
+        best = max(checked, key=lambda row: row["driving_score"])
+        say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
+    policy = folder / POLICY_FOLDER
+    say(
+        f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
+        f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny",
+    )
+    return 0
