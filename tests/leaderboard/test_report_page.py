@@ -194,6 +194,20 @@ def test_a_record_that_the_replay_does_not_follow_is_not_shown_as_one(run):
     assert "cannot be replayed here: at 2 s" in page
 
 
+def test_a_run_of_other_versions_says_that_bits_may_differ(run):
+    other = dataclasses.replace(run, versions={**run.versions, "numpy": "1.0"})
+    page, _ = make_report(other, ROUTES[:1])
+    assert re.search(r"Replayed on numpy [\d.]+, not 1.0 in the run: bits may differ", page)
+    assert "Replayed on" not in make_report(run, ROUTES[:1])[0]
+
+
+def test_an_unfinished_run_says_what_is_missing(run):
+    half = dataclasses.replace(run, routes=run.routes[:1])
+    assert "Not complete: 1 of 2 routes x seeds were driven." in make_report(half)[0]
+    with pytest.raises(ReportError, match="no route of the run is finished yet"):
+        make_report(dataclasses.replace(run, routes=()))
+
+
 def test_the_command_writes_the_page_beside_the_run_and_says_so(folder, capsys):
     assert main(["report", str(folder)]) == 0
     said = capsys.readouterr().out
