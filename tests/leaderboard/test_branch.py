@@ -16,15 +16,15 @@ from di_envs.world_edits import read_world_edits
 from leaderboard.branch import BranchError, branch, branch_run, same_future
 from leaderboard.branch_text import branch_tables
 from leaderboard.cli import main
-from leaderboard.driver import Driver
 from leaderboard.jobs import Job, RunSpec
 from leaderboard.packing import pack
 from leaderboard.record import CONTROL_TYPE, RunRecord
 from leaderboard.replay import replay, replay_env
 from leaderboard.results import read_run, write_run
 from leaderboard.runner import new_run
+from leaderboard.setting_up import scene_of, set_up
 from leaderboard.verify import verify_run
-from leaderboard.warm_up import Scene
+from leaderboard.wall_clock import Stopwatch
 
 SUITE = "town05_tiny"
 ROUTE = "60"  # a turn onto a street on which a bus comes
@@ -58,14 +58,8 @@ def driven(agent: str) -> RunRecord:
     """A run of one route."""
     spec = RunSpec(agent=agent, options={"suite": SUITE, "route_ids": (ROUTE,)})
     job = Job(index=0, route_id=ROUTE, seed=0)
-    with Driver(spec) as driver:
-        town = driver.env.world.town
-        scene = Scene(
-            route_ids=driver.env.route_ids,
-            town=town.name,
-            town_hash=town.content_hash,
-            requires=driver.requires,
-        )
+    with set_up(spec, Stopwatch()) as driver:
+        scene = scene_of(driver)
         record = driver.drive(job)
     run = new_run(spec, [job], load_suite(SUITE), scene)
     return dataclasses.replace(run, routes=(record,))
