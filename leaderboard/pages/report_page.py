@@ -23,6 +23,7 @@ from leaderboard.footing import footing_differences, footing_here, footing_of
 from leaderboard.pages.blocks import write_block
 from leaderboard.pages.film import Film, film_of
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
+from leaderboard.pages.report_map import map_svg
 from leaderboard.pages.report_tables import (
     event_table,
     event_text,
@@ -32,7 +33,6 @@ from leaderboard.pages.report_tables import (
     shown_events,
     summary_cards,
 )
-from leaderboard.pages.town_svg import CM, line_path, simplified, town_bounds, town_svg
 from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env
 
@@ -153,7 +153,7 @@ def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
         routes=route_table(run, records, shown),
         events=event_table(run, records, shown),
         facts=facts_table(run),
-        map=_map(run, films, town),
+        map=map_svg(run, records, town),
         head=json_script("report", _head(run, films)),
         blocks=joined(_block(film) for film in films if film.block),
         scripts=joined(element("script", Markup("\n" + static_text(name))) for name in SCRIPTS),
@@ -264,50 +264,3 @@ def _route_head(run: RunRecord, film: RouteFilm) -> dict[str, Any]:
             for event in record.events
         ],
     }
-
-
-def _map(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> Markup:
-    """The town with the way of each drive and a mark for each infraction."""
-    bounds = town_bounds(town)
-    box = " ".join(f"{v * CM:.0f}" for v in (bounds.left, bounds.top, bounds.width, bounds.height))
-    marks = [mark for film in films for mark in _marks(run, film)]
-    ways = [_way(film.record) for film in films if len(film.record.trace) > 1]
-    return element(
-        "svg",
-        element("g", Markup(town_svg(town)), id="town"),
-        element("g", *ways, id="ways"),
-        element("g", *marks, id="marks"),
-        id="map",
-        viewBox=box,
-        role="group",
-        aria_label=f"Map of {town.name} with all infractions",
-        style=f"--mark: {max(bounds.width, bounds.height) * CM / 1000:.1f}",
-    )
-
-
-def _way(record: RouteRecord) -> Markup:
-    points = simplified(np.array(record.trace)[:, 1:3], 0.2)
-    name = f"route {record.route_id}, seed {record.seed}"
-    path = element("path", element("title", name), d=line_path(points))
-    return element("a", path, href=f"#route={record.route_id}&seed={record.seed}&t=0", tabindex=-1)
-
-
-def _marks(run: RunRecord, film: RouteFilm) -> Iterator[Markup]:
-    record = film.record
-    for event in shown_events(record, run):
-        kind = event.kind.name.lower()
-        met_text = f" ({met(event)})" if met(event) else ""
-        label = (
-            f"{event_text(event)}{met_text}, {event.time_s:.1f} s, "
-            f"route {record.route_id}, seed {record.seed}"
-        )
-        use = element("use", href=f"#mark-{kind}")
-        place = f"transform: translate({event.x * CM:.0f}px, {event.y * CM:.0f}px)"
-        yield element(
-            "a",
-            element("title", label),
-            element("g", use, class_=f"mark kind-{kind}"),
-            style=place,
-            href=f"#route={record.route_id}&seed={record.seed}&t={event.time_s:.2f}",
-            aria_label=label,
-        )

@@ -1,5 +1,6 @@
 "use strict";
-// Lets the SVG map be zoomed with the wheel and dragged; marks keep their size on the screen.
+// Lets the SVG map be zoomed (by a pinch, or the wheel with ctrl: without, the page scrolls on) and
+// dragged; marks keep their size on the screen.
 //
 // di.overview.enhance(svg), di.overview.legend(svg, caption, words)
 
@@ -24,6 +25,7 @@
     }
 
     svg.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey && !event.metaKey) return;
       event.preventDefault();
       const factor = Math.min(Math.exp(event.deltaY * 0.0015), full.width / view.width);
       if (view.width * factor < full.width / 60) return;
@@ -77,7 +79,7 @@
     });
     const hint = document.createElement("span");
     hint.className = "hint";
-    hint.textContent = "A click on a mark opens its moment; wheel and drag move the map, a double click shows all of it.";
+    hint.textContent = "A click on a mark opens its moment; ctrl and the wheel zoom, drag moves the map, a double click shows all of it.";
     caption.replaceChildren(...items, hint);
   }
 
