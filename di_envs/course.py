@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from di_envs.config import RouteEnvConfig, check_name
 from di_envs.observation import Observer, observation_space
@@ -41,6 +42,8 @@ class Course:
         world_config: How many others there are.
         penalties: What infractions cost.
         stops: Events that end an episode besides those by which the rules do.
+        junction_m: Of each route by its id, (R,) how far each of its points is from the next one
+            in a junction, along the route; infinite after the last.
     """
 
     config: RouteEnvConfig
@@ -49,6 +52,7 @@ class Course:
     world_config: WorldConfig
     penalties: Penalties
     stops: tuple[EventKind, ...]
+    junction_m: Mapping[str, NDArray[np.float64]]
 
     @property
     def route_ids(self) -> tuple[str, ...]:
@@ -120,10 +124,12 @@ class Course:
         finished = int(state.finished[ego])
         return {
             "route_id": plan.route_id,
+            "world_seed": int(state.seed),
             "route_completion": 100.0 * after.done_m / plan.length_m,
             "infraction_penalty": infraction_penalty(after, self.penalties),
             "driving_score": 100.0 * score_metres(after, self.penalties) / plan.length_m,
             "game_time_s": int(state.tick) * TICK_S,
+            "junction_m": float(self.junction_m[plan.route_id][state.route_index[ego]]),
             "reward_terms": reward_terms(before, after, self.penalties),
             "events": events,
             "finished": EventKind(finished).name.lower() if finished else "",
@@ -152,11 +158,21 @@ def load_course(options: Mapping[str, Any]) -> Course:
     walkers = suite.traffic.walkers if config.walkers is None else config.walkers
     weather = config.weather or suite.weather
     town = load_town(suite.town_path, suite.signals)
+    plans = suite.plans(town, config.route_ids)
     return Course(
         config=dataclasses.replace(config, traffic=vehicles, walkers=walkers, weather=weather),
         town=town,
-        plans=suite.plans(town, config.route_ids),
+        plans=plans,
         world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
         penalties=PENALTIES[config.rules],
         stops=tuple(EventKind[name.upper()] for name in config.terminate_on),
+        junction_m={plan.route_id: junction_distances(town, plan) for plan in plans},
     )
+
+
+def junction_distances(town: Town, plan: RoutePlan) -> NDArray[np.float64]:
+    """(R,) metres along a route from each of its points to the next one in a junction."""
+    inside = town.lanes.junction[plan.lane] >= 0
+    places = np.append(plan.route_m[inside], np.inf)
+    next_one: NDArray[np.int64] = np.cumsum(inside) - inside  # how many such points come before
+    return np.asarray(places[next_one] - plan.route_m)

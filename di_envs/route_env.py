@@ -47,9 +47,10 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     at the events in `terminate_on`; it is truncated by the route's timeout. The reward is the
     growth of the driving score in metres (`di_envs.reward`). `info` holds:
 
-    - `route_id`, and `route_completion` [percent], `infraction_penalty` (0..1, without the metres
-      outside lanes) and `driving_score` (0..100) so far;
+    - `route_id` and `world_seed`, and `route_completion` [percent], `infraction_penalty` (0..1,
+      without the metres outside lanes) and `driving_score` (0..100) so far;
     - `game_time_s` since the episode began;
+    - `junction_m` along the route to the next junction: 0 in one, infinite after the last;
     - `reward_terms`: the named terms that add up to the reward;
     - `events`: the step's `Event`s, a tuple;
     - `finished`: name of the event that ended the route by the rules, empty while it goes on.

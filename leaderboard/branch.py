@@ -15,17 +15,17 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from agents import load_agent
 from di_envs.edit_text import EditError
 from di_envs.route_env import RouteEnv
 from di_envs.world_edits import WorldEdit
 from leaderboard.episode import drive_route
 from leaderboard.episode_hash import observation_check
+from leaderboard.interventions import sort_interventions
 from leaderboard.jobs import Job
 from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.replay import replay_env, sensor_options
 from leaderboard.rules import rules_named
-from leaderboard.timed_edits import EditPlan, TimedEdit, decisions_before
+from leaderboard.timed_edits import EditPlan, TimedEdit, decisions_before, timed_edits
 
 
 class BranchError(Exception):
@@ -68,12 +68,13 @@ def branch(
 
     Raises:
         BranchError: If there is no such moment, or the agent does not come there as recorded.
-        EditError: If an edit cannot be made at that moment.
+        EditError: If an edit cannot be made at that moment, or the record's cannot be read.
         ReplayError: If the run's environment cannot be made here.
     """
-    own = [text for text in record.interventions if text]
+    own = timed_edits(record.interventions)
     if own:
-        raise BranchError(f"the record has interventions of its own ({'; '.join(own)})")
+        edits_made = "; ".join(map(str, own))
+        raise BranchError(f"the recorded world was edited already ({edits_made})")
     env = replay_env(run, **sensor_options(run))
     decisions = decisions_before(at_s, env.config.control_dt_s)
     if not 0 <= decisions < record.steps:
@@ -83,13 +84,14 @@ def branch(
             f"branch it between 0 and {last_s:g} s, not at {at_s:g} s"
         )
     timed = [TimedEdit(edit=edit, time_s=at_s) for edit in edits]
-    branching = Branching(env, record, decisions, timed, on_step)
+    seen = sort_interventions(record.interventions, env.observation_space)
+    branching = Branching(seen.around(env), record, decisions, timed, on_step)
     edited = drive_route(
         branching,
-        lambda: load_agent(run.agent),
+        lambda: seen.agent(run.agent),
         Job(index=0, route_id=record.route_id, seed=record.seed),
         rules_named(run.rules),
-        interventions=tuple(str(edit) for edit in timed),
+        interventions=(*record.interventions, *map(str, timed)),
     )
     env.close()
     if branching.refused is not None:
@@ -122,16 +124,16 @@ class Branching(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(
         self,
-        env: RouteEnv,
+        env: gymnasium.Env[Any, Any],
         record: RouteRecord,
         decisions: int,
         edits: Sequence[TimedEdit],
         on_step: Callable[[float], None],
     ) -> None:
         super().__init__(env)
-        self._route_env = env
+        self._route_env: RouteEnv = env.unwrapped  # type: ignore[assignment]
         self._decisions, self._on_step = decisions, on_step
-        self._plan = EditPlan(edits, env.config.control_dt_s)
+        self._plan = EditPlan(edits, self._route_env.config.control_dt_s)
         self._controls, self._checks = record.control_array(), record.check_array()
         self._done = 0
         self.refused: BranchError | EditError | None = None
@@ -160,7 +162,7 @@ class Branching(gymnasium.Wrapper[Any, Any, Any, Any]):
             edited = self._plan.apply(self._route_env, self._done)
         except EditError as error:
             self._refuse(error)
-        return self._route_env.observe() if edited else observation
+        return self.env.get_wrapper_attr("observe")() if edited else observation
 
     def _compare(self, what: str, equal: bool) -> None:
         if not equal:

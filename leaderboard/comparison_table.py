@@ -32,7 +32,7 @@ def comparison_tables(comparison: Comparison) -> Group:
 def _score_table(comparison: Comparison) -> Table:
     before, after = comparison.before, comparison.after
     table = Table(
-        title=f"{escape(before.agent)} and {escape(after.agent)} on {escape(before.suite)}"
+        title=f"{escape(before.title)} and {escape(after.title)} on {escape(before.suite)}"
         f" · rules {before.rules}",
         title_justify="left",
         title_style="bold",

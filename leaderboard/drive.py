@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+from gymnasium import spaces
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from agents import load_agent
 from agents.base import Requirements
 from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
@@ -22,6 +22,7 @@ from di_envs.world.world import Event
 from leaderboard.compiling import compile_progress
 from leaderboard.driver import environment_options
 from leaderboard.episode import drive_route
+from leaderboard.interventions import sort_interventions
 from leaderboard.jobs import Job, RunSpec, SetupError
 from leaderboard.record import RouteRecord
 from leaderboard.rules import rules_named
@@ -78,13 +79,15 @@ def drive(
 
         groups = _groups(spec, scene.requires)
         keys = observation_space(groups, env.config.cameras, env.config.lidar).keys()
-        watched = Watched(env, watch, keys)
+        watched = Watched(env, watch, keys)  # a spectator sees what is there, edited or not
+        edits = sort_interventions(spec.interventions, watched.observation_space)
         return drive_route(
-            watched,
-            lambda: load_agent(spec.agent),
+            edits.around(watched),
+            lambda: edits.agent(spec.agent),
             job,
             rules_named(spec.rules),
             requires=scene.requires,
+            interventions=spec.interventions,
         )
 
 
@@ -94,6 +97,9 @@ class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: RouteEnv, watch: Watch, keys: Iterable[str]) -> None:
         super().__init__(env)
         self._watch, self._keys = watch, frozenset(keys)
+        shown: Any = env.observation_space
+        own = {key: part for key, part in shown.items() if key in self._keys}
+        self.observation_space = spaces.Dict(own)
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Resets the environment."""

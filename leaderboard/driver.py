@@ -7,9 +7,10 @@ from types import TracebackType
 from typing import Any
 
 from agents import load_agent
-from agents.base import Requirements
+from agents.base import Agent, Requirements
 from di_envs.route_env import RouteEnv
 from leaderboard.episode import close_agent, drive_route
+from leaderboard.interventions import sort_interventions
 from leaderboard.jobs import Job, RunSpec
 from leaderboard.record import RouteRecord
 from leaderboard.rules import rules_named
@@ -31,6 +32,8 @@ class Driver:
         self._rules = rules_named(spec.rules)
         self.requires = requires or agent_requirements(spec.agent)
         self.env = RouteEnv(**environment_options(spec.options, self.requires))
+        self.interventions = sort_interventions(spec.interventions, self.env.observation_space)
+        self._shown = self.interventions.around(self.env)
 
     def drive(self, job: Job, moved: Callable[[], None] = lambda: None) -> RouteRecord:
         """Drives one route; never raises for what the agent does.
@@ -43,14 +46,18 @@ class Driver:
         self._watch.mark(Doing.SIMULATING)
         try:
             return drive_route(
-                self.env,
-                lambda: TimedAgent(self.spec.agent, self._watch, moved),
+                self._shown,
+                lambda: TimedAgent(self._new_agent, self._watch, moved),
                 job,
                 self._rules,
                 requires=self.requires,
+                interventions=self.spec.interventions,
             )
         finally:
             self._watch.end_job()
+
+    def _new_agent(self) -> Agent[Any]:
+        return self.interventions.agent(self.spec.agent)
 
     def __enter__(self) -> Driver:
         return self

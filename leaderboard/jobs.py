@@ -20,11 +20,13 @@ class RunSpec:
         agent: An agent's name, `module:Class` or `path/to/file.py:Class`.
         options: Environment options; what the agent requires is added to them.
         rules: Name of the scoring rules.
+        interventions: What is edited of what the agent sees, as text.
     """
 
     agent: str
     options: Mapping[str, Any] = field(default_factory=dict)
     rules: str = "carla-1.0"
+    interventions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

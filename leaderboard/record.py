@@ -161,6 +161,7 @@ class RunRecord:
         cpu: CPU capability that the kernels were compiled for.
         routes_hash: Of the ids and points of all routes that the run is over.
         planned: Number of (route, seed) pairs that were asked for.
+        interventions: What was edited of what the agent saw, in every route, as text.
         routes: Those driven, by `index`.
     """
 
@@ -179,7 +180,14 @@ class RunRecord:
     versions: Mapping[str, str]
     cpu: str
     planned: int
+    interventions: tuple[str, ...] = ()
     routes: tuple[RouteRecord, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The agent, and what was edited of what it saw."""
+        edits = "; ".join(self.interventions)
+        return f"{self.agent} with {edits}" if edits else self.agent
 
     @property
     def complete(self) -> bool:

@@ -65,7 +65,7 @@ def print_run(run: RunRecord, console: Console) -> None:
 
 
 def _route_table(run: RunRecord) -> Table:
-    title = f"{escape(run.agent)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
+    title = f"{escape(run.title)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
     table = Table(title=title, title_justify="left", title_style="bold")
     table.add_column("route")
     for name in ("DS", "RC", "IS", "bound", "infr./km"):

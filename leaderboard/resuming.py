@@ -99,4 +99,4 @@ def _was(name: str, old: Any, new: Any) -> str:
 def _text(value: Any) -> str:
     if value is None:
         return "not given"
-    return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
+    return ", ".join(map(str, value)) or "none" if isinstance(value, tuple | list) else str(value)

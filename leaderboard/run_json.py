@@ -32,6 +32,10 @@ def run_to_json(run: RunRecord) -> dict[str, Any]:
     """The run as JSON values, without its routes."""
     fields = {field.name: getattr(run, field.name) for field in dataclasses.fields(run)}
     del fields["routes"]
+    if run.interventions:  # left out where there are none, as in files from before there were any
+        fields["interventions"] = list(run.interventions)
+    else:
+        del fields["interventions"]
     fields["seeds"] = list(run.seeds)
     fields["requires"] = dict(run.requires)
     fields["options"] = dict(run.options)
@@ -47,7 +51,9 @@ def run_from_json(content: Mapping[str, Any]) -> RunRecord:
         TypeError: If one is of another type.
     """
     names = [field.name for field in dataclasses.fields(RunRecord) if field.name != "routes"]
+    names.remove("interventions")
     values = {name: content[name] for name in names}
+    values["interventions"] = tuple(content.get("interventions", ()))
     values["seeds"] = tuple(values["seeds"])
     return _checked(RunRecord, values)
 

@@ -201,6 +201,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
         versions=scene.versions,
         cpu=scene.cpu,
         planned=len(jobs),
+        interventions=spec.interventions,
     )
 
 

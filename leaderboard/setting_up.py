@@ -10,6 +10,7 @@ from di_envs.kernels import cpu_capability
 from leaderboard.driver import Driver, agent_requirements
 from leaderboard.episode import describe
 from leaderboard.episode_log import route_hash
+from leaderboard.interventions import check_interventions
 from leaderboard.jobs import Job, RunSpec, SetupError
 from leaderboard.messages import Scene
 from leaderboard.versions import agent_hash, package_versions
@@ -28,12 +29,16 @@ def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None
         SetupError: If the agent cannot be made, or the environment refuses its options.
     """
     watch.mark(Doing.SETTING_UP)
+    first_time = requires is None
     requires = requires or _requirements(spec.agent)
     watch.mark(Doing.LOADING)
     try:
         driver = Driver(spec, requires, watch)
         first = Job(index=0, route_id=driver.env.route_ids[0], seed=0)
         driver.env.reset(seed=first.world_seed, options={"route": first.route_id})
+        if first_time:
+            space = driver.env.observation_space
+            check_interventions(driver.interventions, spec.agent, space, requires)
     except (ValueError, OSError, ImportError) as error:
         raise SetupError(str(error)) from error
     return driver

@@ -5,27 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from agents import load_agent
 from agents.base import Agent, Control, Observation, Requirements
 from di_envs.town.plan import RoutePlan
 from leaderboard.wall_clock import Doing, Stopwatch
 
 
 class TimedAgent:
-    """The agent of that name; between its calls the simulation is what takes time.
+    """An agent; between its calls the simulation is what takes time.
 
     Args:
-        spec: Names the agent.
+        new_agent: Makes the agent.
         watch: Where its calls are marked.
         moved: Called once the first decision was carried out.
     """
 
     requires: Requirements
 
-    def __init__(self, spec: str, watch: Stopwatch, moved: Callable[[], None]) -> None:
+    def __init__(
+        self, new_agent: Callable[[], Agent[Any]], watch: Stopwatch, moved: Callable[[], None]
+    ) -> None:
         self._watch, self._moved, self._acts = watch, moved, 0
         watch.mark(Doing.SETTING_UP)
-        self._agent: Agent[Any] = load_agent(spec)
+        self._agent = new_agent()
 
     def __getattr__(self, name: str) -> Any:
         """What the agent has beside its calls, found out no sooner than somebody asks."""

@@ -11,17 +11,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from di_envs.edit_text import EditError
 from di_envs.route_env import RouteEnv
 from leaderboard.carla_results import carla_results
 from leaderboard.episode_log import EpisodeLog, route_record
 from leaderboard.footing import footing_differences, footing_here, footing_of
+from leaderboard.interventions import observation_interventions, sort_interventions
 from leaderboard.jobs import Job, plan_jobs
 from leaderboard.record import (
     AGENT_CRASHED,
@@ -31,9 +33,10 @@ from leaderboard.record import (
     RouteRecord,
     RunRecord,
 )
-from leaderboard.replay import ReplayError, replay, replay_env, sensor_options
+from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
 from leaderboard.results import CARLA_FILE, run_folder
 from leaderboard.rules import rules_named
+from wrappers.interventions.context import context_of
 
 AGENT_FAULTS = frozenset({AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID})
 # What a replay cannot know: the clock on the wall, and what was done to what the agent saw
@@ -136,12 +139,13 @@ def replayed_record(run: RunRecord, record: RouteRecord, env: RouteEnv) -> Route
         ReplayError: If they cannot be replayed, or do not end where the claim says.
     """
     log: EpisodeLog | None = None
+    seen = _Seen(record if _shows_the_agents(env, run) else None, env)
     for step in replay(run, record, env=env):
         if step.control is None or log is None:
             log = EpisodeLog(step.view)
         else:
             log.add_step(step.control, step.reward, step.events)
-        log.hashes.add_observation(step.observation)
+        log.hashes.add_observation(seen.shown(step))
     assert log is not None
     fault = (record.status, record.reason) if record.status in AGENT_FAULTS else ("", "")
     if not step.over and not fault[0]:
@@ -150,6 +154,26 @@ def replayed_record(run: RunRecord, record: RouteRecord, env: RouteEnv) -> Route
         raise ReplayError(f"the route was driven to its end, yet its status is '{record.status}'")
     job = Job(index=record.index, route_id=record.route_id, seed=record.seed)
     return route_record(step.view, job, rules_named(run.rules), log, fault=fault)
+
+
+class _Seen:
+    """What the agent was shown: what the environment shows, edited as the record says."""
+
+    def __init__(self, record: RouteRecord | None, env: RouteEnv) -> None:
+        """Takes the record's edits; none where the environment shows less than the agent's did."""
+        self._dt_s = env.config.control_dt_s
+        try:
+            texts = observation_interventions(record.interventions if record else ())
+            edits = sort_interventions(texts, env.observation_space)
+            self._editing = edits.editing(env.observation_space)
+        except EditError as error:
+            raise ReplayError(f"the record's interventions cannot be made here: {error}") from error
+        self._memory = self._editing.start()
+
+    def shown(self, step: ReplayStep) -> Mapping[str, Any]:
+        context = context_of(step.info, self._dt_s)
+        shown, self._memory = self._editing.apply(step.observation, context, self._memory)
+        return shown
 
 
 def _check_problems(record: RouteRecord) -> Iterator[str]:
@@ -227,6 +251,12 @@ def _plan_problems(run: RunRecord, env: RouteEnv) -> Iterator[str]:
             yield (
                 f"number {record.index} claims route {record.route_id}, seed {record.seed}; "
                 f"planned there is route {job.route_id}, seed {job.seed}"
+            )
+        edits = observation_interventions(record.interventions)
+        if edits != run.interventions and not record.lost:
+            yield (
+                f"route {record.route_id}, seed {record.seed} claims the edits "
+                f"'{'; '.join(edits)}', the run '{'; '.join(run.interventions)}'"
             )
 
 

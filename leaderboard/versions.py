@@ -41,7 +41,8 @@ def agent_hash(spec: str) -> str:
     for part in filter(None, parts):
         for path in _files(Path(part), folders=entry is not None):
             digest.update(path.read_bytes())
-    if all(name.isidentifier() for name in parts[0].split(".")):
+    named = not parts[0].endswith(".py")  # a module, not a file that could pass for one
+    if named and all(name.isidentifier() for name in parts[0].split(".")):
         digest.update(sources_digest(parts[0]).encode())
     return digest.hexdigest()
 

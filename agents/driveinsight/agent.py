@@ -5,8 +5,11 @@ Its memory is a value: past BEV features with their poses, and the controllers' 
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -18,8 +21,11 @@ from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Policy
+from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
+from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
 from agents.one_thread import one_thread
+from di_envs.edit_text import EditText
 from di_envs.town.plan import RoutePlan
 
 SHIPPED = Path(__file__).parent / "weights"
@@ -35,10 +41,14 @@ class DriveInsightMemory:
     Attributes:
         frames: Of the last decisions, newest first, as far back as the memory reaches.
         controllers: Past errors.
+        seed: Of the episode: draws of edits inside the policy are keyed by it.
+        decision: How many there have been.
     """
 
     frames: tuple[Frame, ...] = ()
     controllers: ControllerMemory = field(default_factory=ControllerMemory)
+    seed: int = 0
+    decision: int = 0
 
 
 class DriveInsightAgent:
@@ -58,10 +68,21 @@ class DriveInsightAgent:
             waypoint_dt_s=self.policy.config.planner.waypoint_dt_s
         )
         self._every = round(self.policy.config.memory_dt_s / CONTROL_DT_S)
+        self._edits: tuple[TapEdit, ...] = ()
+
+    def edited(self, edits: Sequence[EditText]) -> Self:
+        """The same agent with these edits inside its policy; see `tap_edits`.
+
+        Raises:
+            EditError: If the policy has no such tap, or an edit cannot be read.
+        """
+        other = copy.copy(self)
+        other._edits = tuple(each for text in edits for each in TapEdit.of(text, self.policy))
+        return other
 
     def start(self, plan: RoutePlan, seed: int) -> DriveInsightMemory:
         """An empty memory: the policy knows the route by its prompt alone."""
-        return DriveInsightMemory()
+        return DriveInsightMemory(seed=seed)
 
     def act(
         self, observation: Observation, memory: DriveInsightMemory
@@ -69,7 +90,11 @@ class DriveInsightAgent:
         """One decision."""
         config = self.policy.config
         inputs = inputs_of(config, observation)
-        with one_thread(), torch.inference_mode():
+        moment = Moment(
+            seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
+        )
+        changes = editing(self.policy, tap_edits(self._edits, moment))
+        with one_thread(), torch.inference_mode(), changes:
             output = self.policy(inputs, self._bank(memory.frames))
         frames = memory.frames
         if output.bev is not None and inputs.pose is not None:
@@ -81,7 +106,12 @@ class DriveInsightAgent:
             memory.controllers,
             self._controller,
         )
-        return control, DriveInsightMemory(frames=frames, controllers=controllers)
+        return control, DriveInsightMemory(
+            frames=frames,
+            controllers=controllers,
+            seed=memory.seed,
+            decision=memory.decision + 1,
+        )
 
     def _bank(self, frames: tuple[Frame, ...]) -> MemoryBank | None:
         """The frames that are whole multiples of the memory's step old."""

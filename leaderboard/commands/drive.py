@@ -18,6 +18,8 @@ Examples:
   driveinsight drive --agent expert --suite town05_long --route 3
   driveinsight drive --agent expert --suite town05_long --route 3 --video out.mp4
   driveinsight drive --agent path/to/mine.py:MyAgent --suite town05_tiny --video out.gif
+  driveinsight drive --agent path/to/mine.py:MyAgent --suite town05_tiny \\
+      --intervene "recolour:lights=red@t>5"
 
 The drive is the one that `evaluate` scores for this route and seed, bit for bit."""
 
@@ -46,7 +48,9 @@ class Drive(SceneArguments):
         from leaderboard.jobs import RunSpec, SetupError
         from leaderboard.video import VideoError, check_video
 
-        spec = RunSpec(agent=self.agent, options=options, rules=self.rules)
+        spec = RunSpec(
+            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+        )
         try:
             if self.video is not None:
                 check_video(self.video)

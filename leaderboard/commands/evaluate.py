@@ -27,6 +27,8 @@ Examples:
   driveinsight evaluate --agent expert --town Town05.xodr --signals town05 \\
       --routes routes_town05_long.xml --scenarios scenarios/
   driveinsight evaluate --agent expert --suite town05_long --scenarios none
+  driveinsight evaluate --agent path/to/mine.py:MyAgent --suite town05_tiny \\
+      --intervene "drop:routing; set:speed=0@t>5"
 
 Writes results.json (CARLA's schema) and driveinsight.json with routes/ (everything) into --output,
 each route as it is finished: after Ctrl-C or a crash, the same command with --resume continues."""
@@ -85,7 +87,9 @@ class Evaluate(SceneArguments):
         from leaderboard.results import ResultsError
         from leaderboard.runner import evaluate
 
-        spec = RunSpec(agent=self.agent, options=options, rules=self.rules)
+        spec = RunSpec(
+            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+        )
         try:
             run = evaluate(
                 spec,

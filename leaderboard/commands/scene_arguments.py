@@ -58,6 +58,25 @@ class SceneArguments:
     rules: Annotated[str, says("NAME", "carla-1.0")] = "carla-1.0"
     """Name of the scoring rules."""
 
+    intervene: Annotated[str, says("EDITS", "none")] = ""
+    """Edits of what the agent sees, joined by `;`, such as "drop:routing; set:speed=0@t>5"."""
+
+    def edits(self) -> tuple[str, ...]:
+        """What is edited of what the agent sees, each as records keep it.
+
+        Raises:
+            UsageError: If one cannot be read.
+        """
+        if not self.intervene.strip():
+            return ()
+        from di_envs.edit_text import EditError
+        from leaderboard.interventions import read_interventions
+
+        try:
+            return read_interventions(self.intervene)
+        except EditError as error:
+            raise UsageError(f"--intervene: {error}") from error
+
     def choose(self, route_ids: tuple[str, ...] = ()) -> tuple[dict[str, Any], Suite]:
         """The environment's options and the suite, checked as far as goes without its town.
 

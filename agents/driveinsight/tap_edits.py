@@ -1,0 +1,158 @@
+"""Edits of what is inside the policy: `mask:bev,p=0.3`, the text form of edits, on its taps.
+
+    drop:bev                BEV tokens are zeroed behind their encoder, as dropout did in training
+    zero:TAP                the activation is zeros; `zero:bev` is the fused BEV map
+    mask:TAP,p=0.3          each cell of a map, or token, is zeroed at random, at every decision
+    noise:TAP,sigma=0.1     Gaussian noise on every number
+    identity:TAP            nothing is changed
+
+A tap is named as `tap_names` has it, such as `memory.bev` or `prompt.taps.routing`; `bev` is short
+for where the planner takes the BEV from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from agents.driveinsight.taps import Edit, tap_names
+from di_envs.config import check_name
+from di_envs.edit_conditions import ALWAYS, Condition
+from di_envs.edit_text import EditError, EditText
+from di_envs.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
+
+BEV = "bev"
+_BEV_MAPS = ("memory.bev", "fusion.bev")  # the last one that a policy has
+_BEV_TOKENS = "bev.tokens"
+# What each verb must be told, and up to where it goes
+_AMOUNTS = {"drop": "", "zero": "", "identity": "", "mask": "p", "noise": "sigma"}
+_MOST = {"": 0.0, "p": 1.0, "sigma": float("inf")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """What draws are keyed by, and what conditions ask about.
+
+    Attributes:
+        seed: Of the episode.
+        decision: How many came before.
+        time_s: Game time.
+    """
+
+    seed: int
+    decision: int
+    time_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TapEdit:
+    """One edit of one tap.
+
+    Attributes:
+        verb: What is done.
+        tap: The tap's full name.
+        amount: Of a mask or of noise.
+        when: While it holds; of time alone.
+        stream: What its draws are keyed by.
+    """
+
+    verb: str
+    tap: str
+    amount: float = 0.0
+    when: Condition = ALWAYS
+    stream: int = 0
+
+    @classmethod
+    def of(cls, text: EditText, policy: nn.Module) -> tuple[Self, ...]:
+        """The edits that a text is, one for each of its targets.
+
+        Raises:
+            EditError: If the policy has no such tap, or the text cannot be read.
+        """
+        try:
+            check_name(text.verb, _AMOUNTS, "edit of an activation")
+        except ValueError as error:
+            raise EditError(f"'{text}': {error}") from error
+        name = _AMOUNTS[text.verb]
+        text.refuse_settings_but((name, "seed") if name else ())
+        if text.value is not None or (name and name not in text.settings):
+            example = f",{name}=0.3" if name else ""
+            raise EditError(f"'{text}': write {text.verb}:{text.target}{example}")
+        amount = text.number(name) if name else 0.0
+        if not 0.0 <= amount <= _MOST[name]:
+            raise EditError(f"'{text}': {name} lies in [0, {_MOST[name]:g}], not {amount:g}")
+        when = Condition.of(text.when)
+        when.refuse_names_but(("t",), "inside a policy")
+        stream = stream_of(f"tap edit {text.verb}:{text.target} {dict(text.settings)}")
+        return tuple(
+            cls(verb=text.verb, tap=tap, amount=amount, when=when, stream=stream)
+            for tap in (_tap(target, text, policy) for target in text.target.split("+"))
+        )
+
+    def at(self, moment: Moment) -> Edit:
+        """What it does to an activation at a moment."""
+
+        def edit(activation: Tensor) -> Tensor:
+            match self.verb:
+                case "drop" | "zero":
+                    return torch.zeros_like(activation)
+                case "mask":
+                    return activation * self._kept(moment, activation)
+                case "noise":
+                    return activation + self.amount * self._noise(moment, activation)
+                case _:
+                    return activation
+
+        return edit
+
+    def _kept(self, moment: Moment, activation: Tensor) -> Tensor:
+        """1 or 0 for each cell of a (B, C, X, Y) map, or each row of another activation."""
+        shape = activation.shape
+        part = (shape[0], *shape[2:]) if len(shape) == 4 else shape[:-1]
+        drawn = keyed_uniforms(moment.seed, self.stream, moment.decision, tuple(part))
+        kept = _like(drawn >= self.amount, activation)
+        return kept[:, None] if len(shape) == 4 else kept[..., None]
+
+    def _noise(self, moment: Moment, activation: Tensor) -> Tensor:
+        shape = tuple(activation.shape)
+        return _like(keyed_normals(moment.seed, self.stream, moment.decision, shape), activation)
+
+
+def tap_edits(edits: Sequence[TapEdit], moment: Moment) -> dict[str, Edit]:
+    """Functions for `taps.editing`: of each tap, those edits that hold, one after the other."""
+    chains: dict[str, list[Edit]] = {}
+    for edit in edits:
+        if edit.when.holds({"t": moment.time_s}):
+            chains.setdefault(edit.tap, []).append(edit.at(moment))
+    return {tap: _chained(chain) for tap, chain in chains.items()}
+
+
+def _chained(chain: Sequence[Edit]) -> Edit:
+    def edit(activation: Tensor) -> Tensor:
+        for each in chain:
+            activation = each(activation)
+        return activation
+
+    return edit
+
+
+def _tap(target: str, text: EditText, policy: nn.Module) -> str:
+    known = tap_names(policy)
+    if target == BEV and _BEV_TOKENS in known:
+        maps = [name for name in _BEV_MAPS if name in known]
+        return _BEV_TOKENS if text.verb == "drop" else maps[0]
+    try:
+        check_name(target, known, "tap of the policy")
+    except ValueError as error:
+        raise EditError(f"'{text}': {error}") from error
+    return target
+
+
+def _like(drawn: NDArray[np.float64] | NDArray[np.bool_], activation: Tensor) -> Tensor:
+    return torch.from_numpy(drawn).to(activation.device, activation.dtype)
