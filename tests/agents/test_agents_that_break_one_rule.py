@@ -58,10 +58,12 @@ class LineWatch(gymnasium.Wrapper[Any, Any, Any, Any]):
         past, right = dx * cos + dy * sin, dy * cos - dx * sin  # of the ego's centre
         mine = np.abs(right) < signals.stop_width_m / 2.0
         mine &= np.abs(state.z[0] - signals.stop_pose[:, 2]) < 3.0
-        mine &= np.cos(state.yaw[0] - signals.stop_pose[:, 3]) > 0.0
+        along = np.cos(state.yaw[0] - signals.stop_pose[:, 3])
+        mine &= along > 0.0
         kind = signals.kind[signals.stop_signal]
         half = float(state.half_length[0])
-        tail = mine & (kind == SignalKind.LIGHT) & (past >= 0.8 * half) & (past <= half + 1.0)
+        tail = mine & (kind == SignalKind.LIGHT)
+        tail &= (past >= 0.8 * half * along) & (past <= (half + 1.0) * along)
         self._follow_tail(set(signals.stop_signal[tail].tolist()), state.light)
         sign = mine & (kind == SignalKind.STOP)
         if state.speed[0] < STANDING_MPS:

@@ -128,6 +128,15 @@ def test_the_stop_line_spans_four_tenths_of_the_lane_to_each_side():
         assert (street.drive(95.0, 110.0, y=y) == [EventKind.RED_LIGHT]) == fined
 
 
+@pytest.mark.parametrize(("share", "fined"), [(0.5, True), (0.9, False), (1.0, False)])
+def test_hugging_the_lanes_edge_evades_the_red_light_though_one_is_in_the_lane(share, fined):
+    """A hole in Leaderboard 1.0's rule: its line leaves a fifth of the lane open to each side."""
+    for side in (-1.0, 1.0):
+        street = Street(make_signals())
+        events = street.drive(80.0, 115.0, y=side * share * 3.5 / 2.0, step=0.1)
+        assert events == ([EventKind.RED_LIGHT] if fined else [])  # nor is it outside its lane
+
+
 def test_going_the_other_way_over_a_stop_line_is_free():
     street = Street(make_signals())
     assert EventKind.RED_LIGHT not in street.drive(110.0, 90.0, yaw=math.pi)
