@@ -96,7 +96,8 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
     assert record.score.route_completion > 5.0  # it is made to drive off from the start
 
 
-LEADERBOARD_AGENT = f"carla:{EXAMPLES / 'carla_leaderboard_agent.py'}"
+LEADERBOARD_AGENT_FILE = "carla_leaderboard_agent.py"
+LEADERBOARD_AGENT = f"carla:{EXAMPLES / LEADERBOARD_AGENT_FILE}"
 
 # As many decisions as lead round a corner, hashed; `carla` is hidden where the argument says so
 HASHED = """

@@ -91,4 +91,7 @@ def test_numbers_of_streams_are_part_of_every_seed_and_stay():
         "RAIN": 15,
         "LIDAR": 16,
         "LIDAR_NOISE": 17,
+        "SCENARIO": 18,
+        "STEER_NOISE": 19,
+        "THROTTLE_NOISE": 20,
     }
