@@ -34,7 +34,7 @@ from leaderboard.record import (
     RunRecord,
 )
 from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
-from leaderboard.results import CARLA_FILE, run_folder
+from leaderboard.results import CARLA_FILE, RECORD_FILE, route_files, run_folder
 from leaderboard.rules import rules_named
 from wrappers.interventions.context import context_of
 
@@ -104,7 +104,11 @@ def verify_run(
         ReplayError: If the run's environment cannot be made here.
     """
     env = replay_env(run, **(sensor_options(run) if observations else {}))
-    problems = (*_plan_problems(run, env), *_table_problems(run, folder))
+    problems = (
+        *_plan_problems(run, env),
+        *_table_problems(run, folder),
+        *_spelling_problems(folder),
+    )
     routes = []
     for verdict in _verdicts(run, env, workers):
         on_route(verdict)
@@ -272,6 +276,25 @@ def _table_problems(run: RunRecord, folder: Path) -> Iterator[str]:
     difference = _first_difference("", given, made)
     if difference:
         yield f"{path.name} does not match the routes: {difference}"
+
+
+def _spelling_problems(folder: Path) -> Iterator[str]:
+    """Numbers that are not spelled as they were written: a last digit can change no bit."""
+    top = run_folder(folder)
+    for path in (top / RECORD_FILE, top / CARLA_FILE, *route_files(top)):
+        odd: list[str] = []
+
+        def number(text: str, odd: list[str] = odd) -> float:
+            if repr(float(text)) != text:
+                odd.append(text)
+            return float(text)
+
+        try:
+            json.loads(path.read_text(encoding="utf-8"), parse_float=number)
+        except (OSError, ValueError):
+            continue  # said where it is read
+        if odd:
+            yield f"{path.name} has {odd[0]}, a number that is written {float(odd[0])!r}"
 
 
 def _first_difference(where: str, given: Any, made: Any) -> str:

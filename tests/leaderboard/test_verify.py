@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -203,6 +204,21 @@ def test_a_digit_altered_in_the_file_itself_is_refused(folder, tmp_path, find, p
     shown = capsys.readouterr().out
     assert "The claim does not stand" in shown
     assert said in shown
+
+
+def test_a_digit_too_small_to_change_a_bit_is_found_too(folder, tmp_path, capsys):
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    path = copy / "routes" / "0001.json"
+    text = path.read_text()
+    long = max(re.findall(r"-?\d+\.\d+", text), key=len)
+    digits = [long[:-1] + digit for digit in "0123456789" if digit != long[-1]]
+    same = [other for other in digits if float(other) == float(long)]
+    assert same  # 17 digits are more than a number of 64 bits needs
+    path.write_text(text.replace(long, same[0], 1))
+    assert main(["verify", str(copy)]) == 1
+    shown = capsys.readouterr().out.replace("\n", " ")
+    assert f"0001.json has {same[0]}, a number that is written {long}" in shown
 
 
 def test_a_folder_without_a_run_is_a_wrong_request(tmp_path, capsys):
