@@ -276,6 +276,12 @@ class Observer:
             )
             self._lidar.start(view)
 
+    def change_weather(self, weather: str) -> None:
+        """What cameras see from now on; for much less than another `start`."""
+        self.weather = weather
+        if self._cameras is not None:
+            self._cameras.change_weather(weather_of(weather))
+
     def front(self) -> dict[str, Any]:
         """What a view for people shows of the observation: the front camera, if there is one."""
         return {} if self._cameras is None else self._cameras.observe(only="camera_front")

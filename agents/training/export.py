@@ -154,9 +154,7 @@ def _samples(drive: Drive, config: ExportConfig) -> Iterator[tuple[str, dict[str
     draw = float(uniform(config.seed, int(Stream.AGENT), int(facts["number"]), 4))
     weather = FOURTEEN_WEATHERS[int(draw * len(FOURTEEN_WEATHERS))]
     stage, observer = _stage(town, route, drive.capacity, config)
-    observer.weather = weather
-    stage.set(drive, 0)
-    observer.start(stage.view)
+    observer.change_weather(weather)
     for moment in range(len(drive)):
         stage.set(drive, moment)
         observation = observer.observe()
@@ -189,7 +187,9 @@ def _stage(
         cameras=config.cameras or "small",
         lidar=config.lidar or "paper",
     )
-    return DriveStage(loaded, plan, capacity), observer
+    stage = DriveStage(loaded, plan, capacity)
+    observer.start(stage.view)
+    return stage, observer
 
 
 @lru_cache(2)

@@ -61,13 +61,11 @@ class Renderer:
         """
         right_m, turn_rad, weather = drawn(variation, key)
         stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
-        observer.weather = weather
+        observer.change_weather(weather)
         first = max(last - self.config.memory_frames, 0)
         inputs, targets = [], []
         for moment in range(first, last + 1):
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
-            if moment == first:
-                observer.start(stage.view)
             observation = observer.observe()
             inputs.append(inputs_of(self.config, observation))
             targets.append(self._targets(drive, moment, stage, observation))
@@ -82,7 +80,9 @@ class Renderer:
             cameras=self._rig or "small",
             lidar=lidar,
         )
-        return DriveStage(self._town, plan, capacity), observer
+        stage = DriveStage(self._town, plan, capacity)
+        observer.start(stage.view)  # once: its kernels are looked up in it, which takes a while
+        return stage, observer
 
     def _targets(
         self, drive: Drive, moment: int, stage: DriveStage, observation: dict[str, Any]

@@ -62,6 +62,11 @@ class CameraRig:
         )
         self._render = bind(render, self._studio, canvas, self._ego, 0)
 
+    def change_weather(self, weather: Weather) -> None:
+        """What is seen from now on; for much less than another `start`."""
+        self._look = look_of(weather)
+        self._studio = self._studio._replace(look=self._look)
+
     def observe(self, only: str | None = None) -> dict[str, NDArray[Any]]:
         """The present images; every array is a fresh one.
 
