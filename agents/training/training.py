@@ -21,8 +21,8 @@ import torch
 from torch import Tensor
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
-from agents.driveinsight.losses import losses
-from agents.driveinsight.model import Policy
+from agents.driveinsight.losses import Targets, losses
+from agents.driveinsight.model import Output, Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.training.model_card import model_card
 from agents.training.samples import Batch, hidden_components
@@ -145,23 +145,37 @@ class Training:
         return hidden_components(self.policy.config, size, key)
 
     def _terms(self, batch: Batch) -> Iterator[dict[str, Tensor]]:
-        """The loss of each moment; later ones remember earlier ones, without their gradients."""
-        policy, device = self.policy, next(self.policy.parameters()).device
-        size = len(batch.targets[0].waypoints)
-        hidden = self._hidden(size).to(device)
-        bank = None
-        for t, (inputs, targets) in enumerate(zip(batch.inputs, batch.targets, strict=True)):
-            inputs, targets = _to(inputs, device), _to(targets, device)
-            seen = dataclasses.replace(inputs, present=inputs.present * hidden)
-            with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
-                output = policy(seen, bank)
+        """The loss of each moment."""
+        hidden = self._hidden(len(batch.targets[0].waypoints))
+        for output, targets in unroll(self.policy, batch, hidden):
             yield losses(output, targets, self.config.loss)
-            if policy.memory is not None and output.bev is not None and inputs.pose is not None:
-                bank = bank or policy.empty_bank(size, like=output.bev)
-                bank = bank.remember(output.bev.detach(), inputs.pose)
-                begun = batch.begun[t].bool().to(device)
-                valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
-                bank = dataclasses.replace(bank, valid=valid)
+
+
+def unroll(policy: Policy, batch: Batch, hidden: Tensor) -> Iterator[tuple[Output, Targets]]:
+    """What a policy says at each moment of a batch, one after the other.
+
+    Later moments remember earlier ones, without their gradients. A sample that begins later than
+    others, at its drive's start, remembers nothing of the time before.
+
+    Args:
+        policy: On any device; on a GPU in mixed precision.
+        batch: Of T moments.
+        hidden: (B, 10) 0 for components that are hidden.
+    """
+    device = next(policy.parameters()).device
+    hidden, bank = hidden.to(device), None
+    for t in range(len(batch.inputs)):
+        inputs, targets = _to(batch.inputs[t], device), _to(batch.targets[t], device)
+        seen = dataclasses.replace(inputs, present=inputs.present * hidden)
+        with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+            output = policy(seen, bank)
+        yield output, targets
+        if policy.memory is not None and output.bev is not None and inputs.pose is not None:
+            bank = bank or policy.empty_bank(len(hidden), like=output.bev)
+            bank = bank.remember(output.bev.detach(), inputs.pose)
+            begun = batch.begun[t].bool().to(device)
+            valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
+            bank = dataclasses.replace(bank, valid=valid)
 
 
 def _to(values: Any, device: torch.device) -> Any:
