@@ -58,7 +58,7 @@ def bev_semantics(view: WorldView, grid: GridConfig) -> NDArray[np.uint8]:
 
 @kernel
 def _ground(raster, pose, sides, out):
-    """Road where most of a cell is, a line where any of it is."""
+    """Road where most of a cell is, a line where two samples or more meet one."""
     c, s = math.cos(pose[3]), math.sin(pose[3])
     width, height = raster.width[0], raster.height[0]
     for i in range(out.shape[0]):
@@ -66,8 +66,9 @@ def _ground(raster, pose, sides, out):
             road, line = 0, 0
             for a in range(SAMPLES):
                 for b in range(SAMPLES):
-                    ahead = sides[0] + (i + (a + 0.5) / SAMPLES) * sides[2]
-                    right = sides[1] + (j + (b + 0.5) / SAMPLES) * sides[3]
+                    # no two on a line along or across: a painted line is thinner than their gaps
+                    ahead = sides[0] + (i + (a + (b + 0.5) / SAMPLES) / SAMPLES) * sides[2]
+                    right = sides[1] + (j + (b + (a + 0.5) / SAMPLES) / SAMPLES) * sides[3]
                     x = pose[0] + c * ahead - s * right - raster.origin[0]
                     y = pose[1] + s * ahead + c * right - raster.origin[1]
                     column, row = int(x / TEXEL_M), int(y / TEXEL_M)

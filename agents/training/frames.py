@@ -96,9 +96,15 @@ def _whole_fields(capacity: Capacity) -> tuple[str, ...]:
 
 @dataclass(kw_only=True)
 class DriveLog:
-    """Gathers moments while a route is driven."""
+    """Gathers moments while a route is driven.
+
+    Attributes:
+        view: Of the world; it shows the present.
+        reach_m: Actors up to so far from the ego are kept.
+    """
 
     view: WorldView
+    reach_m: float = REACH_M
     whole: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
     actors: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
     ids: list[NDArray[np.int16]] = field(default_factory=list)
@@ -107,7 +113,7 @@ class DriveLog:
     def add(self, control: NDArray[np.float32]) -> None:
         """Adds the present moment, and what the expert does in it."""
         state = self.view.state
-        near = np.hypot(state.x - state.x[0], state.y - state.y[0]) < REACH_M
+        near = np.hypot(state.x - state.x[0], state.y - state.y[0]) < self.reach_m
         ids = np.flatnonzero((state.kind != ActorKind.ABSENT) & near)
         for name in _whole_fields(self.view.capacity):
             self.whole.setdefault(name, []).append(getattr(state, name).copy())

@@ -116,10 +116,15 @@ def _depth_bins(config: PolicyConfig, images: Sequence[NDArray[np.float32]]) -> 
     assert camera is not None
     depths = depths_m(camera)
     step = depths[1] - depths[0]
-    half = camera.stride // 2
-    centres = np.stack([image[half :: camera.stride, half :: camera.stride] for image in images])
+    rows, columns = (_feature_centres(size, camera.stride) for size in images[0].shape)
+    centres = np.stack([image[np.ix_(rows, columns)] for image in images])
     bins = np.rint((centres - depths[0]) / step).astype(np.int64)
     return np.where((bins >= 0) & (bins < len(depths)), bins, -1)
+
+
+def _feature_centres(size: int, stride: int) -> NDArray[np.int64]:
+    """The pixels in the middle of feature pixels; the last of these may reach over the edge."""
+    return np.minimum(np.arange(0, size, stride) + stride // 2, size - 1)
 
 
 @dataclass(frozen=True, kw_only=True)

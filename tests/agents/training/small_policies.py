@@ -1,0 +1,30 @@
+"""Policies small enough to be trained within a test."""
+
+from __future__ import annotations
+
+from agents.driveinsight.config import (
+    CameraEncoderConfig,
+    GridConfig,
+    LidarEncoderConfig,
+    PlannerConfig,
+    PolicyConfig,
+)
+
+_PLANNER = PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4)
+
+PROMPT_ONLY = PolicyConfig(
+    name="test-prompt-only",
+    camera=None,
+    lidar=None,
+    memory_frames=0,
+    planner=PlannerConfig(width=32, heads=2, layers=1),
+)
+SEEING = PolicyConfig(
+    name="test-seeing",
+    grid=GridConfig(cells=24),
+    camera=CameraEncoderConfig(rig="rl", width=4, stride=8, channels=4, depth_bins=4),
+    lidar=LidarEncoderConfig(voxel_m=0.8, voxel_z_m=3.5, widths=(4, 4), channels=4),
+    planner=_PLANNER,
+    memory_frames=2,
+    bev_width=4,
+)
