@@ -210,6 +210,9 @@ def _notes(run: RunRecord, films: Sequence[RouteFilm]) -> Iterator[str]:
         yield f"Not complete: {len(run.routes)} of {run.planned} routes x seeds were driven."
     if len(films) < len(run.routes):
         yield f"This page is about {len(films)} of the {len(run.routes)} routes x seeds."
+    done = dict.fromkeys(text for film in films for text in film.record.interventions)
+    if done:
+        yield f"With what was done to the world, or to what the agent saw: {'; '.join(done)}."
     lost = sum(film.record.lost for film in films)
     if lost:
         yield (

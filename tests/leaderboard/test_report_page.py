@@ -201,6 +201,13 @@ def test_a_run_of_other_versions_says_that_bits_may_differ(run):
     assert "Replayed on" not in make_report(run, ROUTES[:1])[0]
 
 
+def test_what_was_done_to_the_world_stands_before_the_figures(run):
+    first = dataclasses.replace(run.routes[0], interventions=("change:weather=HardRainNoon@t=1",))
+    page, films = make_report(dataclasses.replace(run, routes=(first,)))
+    assert films[0].block  # weather moves nobody
+    assert "what the agent saw: change:weather=HardRainNoon@t=1." in page
+
+
 def test_an_unfinished_run_says_what_is_missing(run):
     half = dataclasses.replace(run, routes=run.routes[:1])
     assert "Not complete: 1 of 2 routes x seeds were driven." in make_report(half)[0]
