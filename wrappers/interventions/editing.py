@@ -13,7 +13,7 @@ from di_envs.edit_conditions import UNITS
 from di_envs.edit_text import EditError
 from wrappers.interventions.context import EditContext
 from wrappers.interventions.edit import Observation, ObservationEdit
-from wrappers.interventions.layout import names_in
+from wrappers.interventions.layout import beside, names_in
 from wrappers.interventions.table import read_observation_edits
 
 Memory = tuple[Any, ...]  # one value an edit; None where there is nothing to remember
@@ -97,7 +97,7 @@ class ObservationEditing:
             if not edit.stays:
                 value = self._in_space(edit, name, value, old)
             if not np.all(holds):
-                value = np.where(_beside(holds, value), value, old)
+                value = np.where(beside(holds, value), value, old)
             # Single worlds' choices are numpy numbers, not arrays of no dimension
             found[name] = value if isinstance(old, np.ndarray) else np.asarray(value)[()]
         return found
@@ -127,8 +127,3 @@ class ObservationEditing:
         for name in found:
             edit.check(name, self._space)
         return found
-
-
-def _beside(holds: Any, value: Any) -> Any:
-    """(...) for (..., *shape): broadcasts worlds over the entries of each."""
-    return np.reshape(holds, (*np.shape(holds), *(1,) * (np.ndim(value) - np.ndim(holds))))

@@ -71,3 +71,8 @@ def names_in(space: spaces.Dict, target: str) -> tuple[str, ...]:
     except ValueError as error:
         raise EditError(str(error)) from error
     return (name,)
+
+
+def beside(worlds: Any, value: Any) -> Any:
+    """(...) for (..., *shape): broadcasts what is said of worlds over the entries of each."""
+    return np.reshape(worlds, (*np.shape(worlds), *(1,) * (np.ndim(value) - np.ndim(worlds))))

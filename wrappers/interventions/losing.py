@@ -11,7 +11,7 @@ from gymnasium import spaces
 from di_envs.edit_text import EditError
 from wrappers.interventions.context import EditContext
 from wrappers.interventions.edit import Draws, Observation, ObservationEdit, setting
-from wrappers.interventions.layout import has_valid, is_camera
+from wrappers.interventions.layout import beside, has_valid, is_camera
 
 BLOCK = 16  # pixels: a side of what is masked of an image at once
 
@@ -105,8 +105,8 @@ class Blackout(ObservationEdit):
 class Delay(ObservationEdit):
     """What is seen is old; until there is anything so old, it is what the episode began with.
 
-    Its memory holds the last moments, the newest first. Which one is shown follows from how many
-    decisions an episode has had, so a world of many may begin anew and its memory be forgotten.
+    Its memory is a ring of the last moments, each in the place that its number of decisions gives:
+    to look twice at a moment changes nothing, and a world of many may begin anew by itself.
 
     Attributes:
         steps: How many decisions old.
@@ -121,13 +121,23 @@ class Delay(ObservationEdit):
         self, names: tuple[str, ...], observation: Observation, context: EditContext, memory: Any
     ) -> tuple[dict[str, Any], Any]:
         now = {name: np.array(observation[name]) for name in names}
-        moments = (now, *(memory or ()))[: self.steps + 1]
-        ages = np.minimum(np.minimum(context.decision, self.steps), len(moments) - 1)
-        shown = {}
-        for name in names:
-            if np.ndim(ages) == 0:
-                shown[name] = moments[int(ages)][name].copy()
-                continue
-            rows = [moments[age][name][row] for row, age in np.ndenumerate(ages)]
-            shown[name] = np.stack(rows).reshape(now[name].shape).astype(now[name].dtype)
-        return shown, moments
+        ring = list(memory or [now] * (self.steps + 1))
+        wanted = np.maximum(np.subtract(context.decision, self.steps), 0)
+        if np.ndim(wanted) == 0:
+            ring[int(context.decision) % len(ring)] = now
+            old = ring[int(wanted) % len(ring)]
+            return {name: value.copy() for name, value in old.items()}, tuple(ring)
+        slots = np.asarray(context.decision) % len(ring)
+        for slot in np.unique(slots).tolist():
+            ring[slot] = {
+                name: np.where(beside(slots == slot, new), new, ring[slot][name])
+                for name, new in now.items()
+            }
+        shown = dict(now)
+        for slot in np.unique(wanted % len(ring)).tolist():
+            rows = wanted % len(ring) == slot
+            shown = {
+                name: np.where(beside(rows, old), ring[slot][name], old)
+                for name, old in shown.items()
+            }
+        return shown, tuple(ring)

@@ -1,0 +1,160 @@
+"""Edits inside the policy, and what dropping a component is: its token behind its encoder, zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from random_inputs import random_inputs
+
+from agents.driveinsight.agent import DriveInsightAgent
+from agents.driveinsight.config import config_named
+from agents.driveinsight.inputs import inputs_of
+from agents.driveinsight.model import Policy
+from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
+from agents.driveinsight.taps import editing, watching
+from agents.driveinsight.weights import save_pretrained
+from di_envs.edit_text import EditError, read_edits
+from di_envs.observation import observation_space
+from di_envs.prompt import COMPONENTS
+from wrappers.interventions import ObservationEditing
+from wrappers.interventions.context import EditContext
+
+NOW = Moment(seed=3, decision=60, time_s=6.0)
+
+
+def made(name: str) -> Policy:
+    torch.manual_seed(0)
+    return Policy(config_named(name)).eval()
+
+
+@pytest.fixture(scope="module")
+def prompted() -> Policy:
+    return made("small-prompt-only")
+
+
+@pytest.fixture(scope="module")
+def seeing() -> Policy:
+    return made("small-without-cameras")
+
+
+def read(text, policy):
+    return [each for edit in read_edits(text) for each in TapEdit.of(edit, policy)]
+
+
+def planned(policy, inputs, text="", moment=NOW):
+    edits = tap_edits(read(text, policy), moment)
+    with torch.inference_mode(), editing(policy, edits), watching(policy) as seen:
+        waypoints = policy(inputs).waypoints
+    return waypoints, {name: passed[0] for name, passed in seen.items()}
+
+
+def shown(observation, text):
+    space = observation_space(("prompt",))
+    context = EditContext(
+        seed=1, tick=4, decision=2, time_s=0.2, route_completion=1.0, junction_m=9.0
+    )
+    editing = ObservationEditing(text, space)
+    return editing.apply(observation, context, editing.start())[0]
+
+
+@pytest.mark.parametrize("component", COMPONENTS)
+def test_drop_is_the_policys_zero_token_to_the_bit_and_zero_is_not(prompted, component):
+    inputs = random_inputs(prompted.config)
+    observation = {name: value[0].numpy() for name, value in inputs.prompt.items()}
+    observation["command"] = np.int64(2)
+    observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
+    tap = f"prompt.taps.{component}"
+    tokens = {}
+    for verb in ("identity", "drop", "zero"):
+        edited = inputs_of(prompted.config, shown(observation, f"{verb}:{component}"))
+        waypoints, seen = planned(prompted, edited)
+        tokens[verb] = (waypoints, seen[tap])
+    assert not tokens["drop"][1].any()
+    assert tokens["zero"][1].any()
+    # As training's dropout does it: the token is zero behind its encoder, whatever it encodes.
+    whole = inputs_of(prompted.config, observation)
+    with torch.inference_mode(), editing(prompted, {tap: torch.zeros_like}):
+        dropped_out = prompted(whole).waypoints
+    assert torch.equal(tokens["drop"][0], dropped_out)
+    assert not torch.equal(tokens["zero"][0], dropped_out)
+    assert torch.equal(tokens["identity"][0], planned(prompted, whole)[0])
+
+
+def test_dropped_bev_is_bev_that_is_not_present(seeing):
+    inputs = random_inputs(seeing.config)
+    present = inputs.present.clone()
+    present[:, -1] = 0.0
+    with torch.inference_mode():
+        absent = seeing(type(inputs)(**{**vars(inputs), "present": present})).waypoints
+    assert torch.equal(planned(seeing, inputs, "drop:bev")[0], absent)
+    assert not torch.equal(planned(seeing, inputs, "zero:bev")[0], absent)
+
+
+def test_an_edit_that_edits_nothing_changes_no_bit(seeing):
+    inputs = random_inputs(seeing.config)
+    plain = planned(seeing, inputs)[0]
+    for text in ("identity:bev", "mask:bev,p=0", "zero:bev@t>9", "noise:waypoints,sigma=0"):
+        assert torch.equal(planned(seeing, inputs, text)[0], plain)
+
+
+def test_a_masked_map_loses_whole_cells_and_that_share_of_them(seeing):
+    inputs = random_inputs(seeing.config)
+    _, plain = planned(seeing, inputs)
+    _, masked = planned(seeing, inputs, "mask:bev,p=0.3")
+    before, after = plain["memory.bev"][0], masked["memory.bev"][0]
+    lost = (after == 0).all(dim=0)
+    assert torch.equal(after[:, ~lost], before[:, ~lost])
+    assert lost.float().mean() == pytest.approx(0.3, abs=0.05)
+
+
+def test_draws_are_keyed_by_the_seed_and_the_decision(seeing):
+    inputs = random_inputs(seeing.config)
+
+    def noisy(seed, decision):
+        moment = Moment(seed=seed, decision=decision, time_s=1.0)
+        return planned(seeing, inputs, "noise:waypoints,sigma=1", moment)[0]
+
+    assert torch.equal(noisy(3, 60), noisy(3, 60))
+    assert not torch.equal(noisy(3, 60), noisy(3, 61))
+    assert not torch.equal(noisy(3, 60), noisy(4, 60))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mask:bevv,p=0.3", "Unknown tap of the policy 'bevv'"),
+        ("mask:bev", "write mask:bev,p=0.3"),
+        ("mask:bev,p=2", r"p lies in \[0, 1\], not 2"),
+        ("blackout:bev", "Unknown edit of an activation 'blackout'"),
+        ("zero:bev@junction<9", "inside a policy only t is known"),
+    ],
+)
+def test_what_cannot_be_done_inside_is_refused(seeing, text, message):
+    with pytest.raises(EditError, match=message):
+        read(text, seeing)
+
+
+def test_a_policy_without_bev_has_none_to_edit(prompted):
+    with pytest.raises(EditError, match="Unknown tap of the policy 'bev'"):
+        read("mask:bev,p=0.3", prompted)
+
+
+def test_an_edited_agent_acts_otherwise_and_leaves_the_first_as_it_was(prompted, tmp_path):
+    save_pretrained(prompted, tmp_path, card="Not trained.")
+    agent = DriveInsightAgent(weights=tmp_path)
+    inputs = random_inputs(prompted.config)
+    observation = {name: value[0].numpy() for name, value in inputs.prompt.items()}
+    observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
+    edited = agent.edited(read_edits("noise:waypoints,sigma=5@t>0.05"))
+    seen = []
+    for driver in (agent, edited, agent, edited):
+        memory, controls = driver.start(None, 5), []
+        for _ in range(3):
+            control, memory = driver.act(observation, memory)
+            controls.append(control)
+        seen.append(np.array(controls))
+    assert np.array_equal(seen[0], seen[2])
+    assert np.array_equal(seen[1], seen[3])
+    assert np.array_equal(seen[0][0], seen[1][0])  # 0.05 s have not passed yet
+    assert not np.array_equal(seen[0][1:], seen[1][1:])
