@@ -25,11 +25,13 @@ from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
 from di_envs.world_edits import WORLD_EDITS, read_world_edits
 from leaderboard.cli import Command, Evaluate
+from leaderboard.commands.train import Train
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
+TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
 README = (TOP / "README.md").read_text(encoding="utf-8")
 CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
 
@@ -38,9 +40,9 @@ def blocks(text, language):
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def shell_commands(program):
-    """The command lines of the README that run a program, without their comments."""
-    for block in blocks(README, "sh"):
+def shell_commands(program, page=README):
+    """The command lines of a page that run a program, without their comments."""
+    for block in blocks(page, "sh"):
         for line in block.splitlines():
             for part in line.split("&&"):
                 words = shlex.split(part, comments=True)
@@ -125,6 +127,16 @@ def test_the_readmes_commands_parse_and_name_what_there_is():
             name = command.agent.rpartition(":")[0]
             assert command.agent in AGENTS or (TOP / name).is_file(), command.agent
             assert command.suite in suite_names() or (command.town and command.routes)
+
+
+def test_the_commands_of_the_page_on_training_parse_and_name_configurations_there_are():
+    from agents.driveinsight.config import CONFIGS
+
+    commands = [tyro.cli(Command, args=words) for words in shell_commands("driveinsight", TRAINING)]
+    trained = [command.config for command in commands if isinstance(command, Train)]
+    assert len(trained) >= 3
+    assert set(trained) <= set(CONFIGS)
+    assert set(CONFIGS) <= set(re.findall(r"`([^`\n]+)`", TRAINING))
 
 
 def test_the_test_command_follows_its_marker_on_one_line():
