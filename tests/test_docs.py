@@ -17,6 +17,7 @@ import tyro
 import di_envs
 from agents import AGENTS
 from agents.base import Requirements
+from di_envs.edit_conditions import Condition
 from di_envs.edit_text import read_edits
 from di_envs.observation import observation_space
 from di_envs.penalties import PENALTIES
@@ -26,12 +27,14 @@ from di_envs.world.state import EVENT_KINDS, EventKind
 from di_envs.world_edits import WORLD_EDITS, read_world_edits
 from leaderboard.cli import Command, Evaluate
 from leaderboard.commands.train import Train
+from wrappers.interventions import EDITS, ObservationEditing
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
+EDITS_PAGE = (TOP / "docs" / "interventions.md").read_text(encoding="utf-8")
 README = (TOP / "README.md").read_text(encoding="utf-8")
 CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
 
@@ -102,6 +105,32 @@ def test_the_python_of_the_page_on_agents_runs(number, tmp_path):
         env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("number", range(len(blocks(EDITS_PAGE, "python"))))
+def test_the_python_of_the_page_on_interventions_runs(number, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", blocks(EDITS_PAGE, "python")[number]],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_tables_of_edits_and_conditions_are_what_there_is():
+    space = observation_space(("prompt", "camera", "lidar"))
+    told = [name for name in rows(EDITS_PAGE, 2) if ":" in name]
+    assert {name.partition(":")[0] for name in told} == set(EDITS)
+    for name in told:
+        ObservationEditing(name, space)
+    conditions = [name for name in rows(EDITS_PAGE, 2) if name.startswith("@")]
+    assert len(conditions) == 4
+    for name in conditions:
+        assert f"@{Condition.of(name[1:])}" == name
 
 
 def test_the_readmes_agent_is_one():

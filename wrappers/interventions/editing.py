@@ -78,26 +78,30 @@ class ObservationEditing:
         shown, kept = observation, []
         for step, old in zip(self._steps, memory, strict=True):
             holds = step.edit.when.holds(context.values()) if step.edit.when.terms else True
-            if not step.edit.remembers and not np.any(holds):
+            # numpy's any and all take longer than a small edit, where one world says yes or no
+            one = isinstance(holds, bool | np.bool_)
+            somewhere = bool(holds) if one else bool(holds.any())
+            if not step.edit.remembers and not somewhere:
                 kept.append(old)
                 continue
             changes, new = step.edit.changes(step.names, shown, context, old)
             kept.append(new)
-            if np.any(holds):
-                shown = {**shown, **self._allowed(step.edit, changes, shown, holds)}
+            if somewhere:
+                worlds = None if one or holds.all() else holds
+                shown = {**shown, **self._allowed(step.edit, changes, shown, worlds)}
         return shown, tuple(kept)
 
     def _allowed(
-        self, edit: ObservationEdit, changes: Mapping[str, Any], before: Observation, holds: Any
+        self, edit: ObservationEdit, changes: Mapping[str, Any], before: Observation, worlds: Any
     ) -> dict[str, Any]:
-        """The changes, moved into the space, in those worlds in which the condition holds."""
+        """The changes, moved into the space; in those worlds that are true, None for all."""
         found = {}
         for name, value in changes.items():
             old = before[name]
             if not edit.stays:
                 value = self._in_space(edit, name, value, old)
-            if not np.all(holds):
-                value = np.where(beside(holds, value), value, old)
+            if worlds is not None:
+                value = np.where(beside(worlds, value), value, old)
             # Single worlds' choices are numpy numbers, not arrays of no dimension
             found[name] = value if isinstance(old, np.ndarray) else np.asarray(value)[()]
         return found

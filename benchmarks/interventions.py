@@ -1,0 +1,74 @@
+"""What an edit of the observation costs, beside the step that makes the observation.
+
+    python benchmarks/interventions.py
+
+CPU time of one core; prints and asserts nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from di_envs.route_env import RouteEnv
+from wrappers.interventions import ObservationEditing
+from wrappers.interventions.context import context_of
+
+EDITS = (
+    "identity:speed", "drop:routing", "zero:routing", "clear:obstacles", "set:speed=10",
+    "noise:map,sigma=0.5", "mask:map,p=0.3", "recolour:lights=red@t>5",
+    "shift:routing+target_point,lateral=3.5", "replace:command=LEFT", "delay:speed,steps=5",
+    "blackout:camera_left", "noise:camera_front,sigma=8", "thin:lidar,keep=0.25",
+)  # fmt: skip
+GROUPS = (("prompt",), ("camera", "lidar", "prompt"))
+STAND = np.array([0.0, 0.0, 1.0], np.float32)
+
+
+def cpu_us(work: Callable[[], object], repeats: int, rounds: int = 5) -> float:
+    """Microseconds of CPU that it takes, the best of some rounds."""
+    best = float("inf")
+    for _ in range(rounds):
+        start_s = time.process_time()
+        for _ in range(repeats):
+            work()
+        best = min(best, (time.process_time() - start_s) / repeats)
+    return best * 1e6
+
+
+def measured(groups: tuple[str, ...]) -> Table:
+    """What each edit costs where these groups are observed."""
+    env = RouteEnv(suite="town05_tiny", traffic=120, walkers=60, observations=groups)
+    env.reset(seed=0, options={"route": 0})
+    step_us = cpu_us(lambda: env.step(STAND), 40)
+    observation, *_, info = env.step(STAND)
+    table = Table(title=f"{' '.join(groups)}: a step takes {step_us:.0f} us")
+    for name in ("edit", "us", "% of a step"):
+        table.add_column(name, justify="left" if name == "edit" else "right")
+    for text in EDITS:
+        target = text.partition(":")[2].partition(",")[0]
+        if "camera" not in groups and target.startswith(("camera", "lidar")):
+            continue
+        editing = ObservationEditing(text, env.observation_space)
+
+        def edit(editing: ObservationEditing = editing) -> None:
+            context = context_of(info, env.config.control_dt_s)
+            editing.apply(observation, context, editing.start())
+
+        edit_us = cpu_us(edit, 200 if target != "camera_front" else 10)
+        table.add_row(text, f"{edit_us:.1f}", f"{100.0 * edit_us / step_us:.2f}")
+    return table
+
+
+def main() -> None:
+    """Prints a table for each choice of observations."""
+    console = Console()
+    for groups in GROUPS:
+        console.print(measured(groups))
+
+
+if __name__ == "__main__":
+    main()
