@@ -77,7 +77,7 @@ class ObservationEditing:
         """
         shown, kept = observation, []
         for step, old in zip(self._steps, memory, strict=True):
-            holds = step.edit.when.holds(context.values()) if step.edit.when.terms else True
+            holds: Any = step.edit.when.holds(context.values()) if step.edit.when.terms else True
             # numpy's any and all take longer than a small edit, where one world says yes or no
             one = isinstance(holds, bool | np.bool_)
             somewhere = bool(holds) if one else bool(holds.any())
