@@ -71,7 +71,8 @@ def warp(features: Tensor, then: Tensor, now: Tensor, grid: GridConfig) -> Tenso
     along_x = 2.0 * (ahead - grid.x_min_m) / (grid.x_max_m - grid.x_min_m) - 1.0
     along_y = 2.0 * (right - grid.y_min_m) / (grid.y_max_m - grid.y_min_m) - 1.0
     where = torch.stack([along_y, along_x], dim=2).view(-1, grid.cells, grid.cells, 2)
-    return F.grid_sample(features, where.to(features.dtype), align_corners=False)
+    # places are whole in mixed precision too: bfloat16 would move them by up to 7 cm
+    return F.grid_sample(features.float(), where, align_corners=False).to(features.dtype)
 
 
 def _cell_centres(grid: GridConfig, like: Tensor) -> tuple[Tensor, Tensor]:

@@ -147,27 +147,31 @@ class Training:
     def _terms(self, batch: Batch) -> Iterator[dict[str, Tensor]]:
         """The loss of each moment."""
         hidden = self._hidden(len(batch.targets[0].waypoints))
-        for output, targets in unroll(self.policy, batch, hidden):
+        mixed = next(self.policy.parameters()).is_cuda
+        for output, targets in unroll(self.policy, batch, hidden, mixed=mixed):
             yield losses(output, targets, self.config.loss)
 
 
-def unroll(policy: Policy, batch: Batch, hidden: Tensor) -> Iterator[tuple[Output, Targets]]:
+def unroll(
+    policy: Policy, batch: Batch, hidden: Tensor, *, mixed: bool = False
+) -> Iterator[tuple[Output, Targets]]:
     """What a policy says at each moment of a batch, one after the other.
 
     Later moments remember earlier ones, without their gradients. A sample that begins later than
     others, at its drive's start, remembers nothing of the time before.
 
     Args:
-        policy: On any device; on a GPU in mixed precision.
+        policy: On any device.
         batch: Of T moments.
         hidden: (B, 10) 0 for components that are hidden.
+        mixed: In mixed precision (bfloat16).
     """
     device = next(policy.parameters()).device
     hidden, bank = hidden.to(device), None
     for t in range(len(batch.inputs)):
         inputs, targets = _to(batch.inputs[t], device), _to(batch.targets[t], device)
         seen = dataclasses.replace(inputs, present=inputs.present * hidden)
-        with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+        with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
             output = policy(seen, bank)
         yield output, targets
         if policy.memory is not None and output.bev is not None and inputs.pose is not None:

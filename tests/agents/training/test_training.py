@@ -9,6 +9,7 @@ import pytest
 import torch
 from small_policies import PROMPT_ONLY, SEEING
 
+from agents.driveinsight.losses import losses
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import (
     WeightsError,
@@ -228,6 +229,20 @@ def test_a_sample_at_a_drives_start_remembers_nothing_of_before_it(moments):
     assert valid.sum() > 0
     assert torch.allclose(together[0], last([short])[0][0], atol=1e-5)
     assert torch.allclose(together[1], last([long])[0][0], atol=1e-5)
+
+
+def test_mixed_precision_gives_whole_waypoints_near_the_exact_ones(moments):
+    torch.manual_seed(0)
+    policy = Policy(SEEING).eval()
+    batch = batch_of([Samples(SEEING, SHORT, moments)[0]])
+    hidden = torch.ones(1, 10)
+    with torch.no_grad():
+        *_, (exact, _) = unroll(policy, batch, hidden)
+        *_, (mixed, targets) = unroll(policy, batch, hidden, mixed=True)
+    assert mixed.waypoints.dtype == torch.float32
+    assert torch.allclose(exact.waypoints, mixed.waypoints, atol=0.2)
+    terms = losses(mixed, targets, SHORT.loss)
+    assert all(term.dtype == torch.float32 for term in terms.values())
 
 
 def test_components_are_hidden_as_often_as_the_configuration_says():
