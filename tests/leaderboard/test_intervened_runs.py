@@ -13,7 +13,8 @@ import pytest
 from di_envs.edit_text import EditError
 from di_envs.route_env import RouteEnv
 from di_envs.suites import load_suite
-from leaderboard.branch import branch, same_future
+from di_envs.world_edits import read_world_edits
+from leaderboard.branch import branch, branch_run, same_future
 from leaderboard.cli import main
 from leaderboard.comparing import compare_runs
 from leaderboard.driver import Driver
@@ -106,6 +107,16 @@ def test_a_run_is_compared_with_its_baseline_and_not_resumed_as_it(plain, edited
 def test_a_branch_sees_what_the_recorded_agent_saw(edited):
     futures = branch(edited, edited.routes[0], 4.0, ())
     assert same_future(futures.recorded, futures.edited)
+
+
+def test_a_branch_into_another_world_is_seen_through_the_same_edits(edited, tmp_path):
+    futures = branch(edited, edited.routes[0], 2.0, read_world_edits("force:light=0,state=red"))
+    assert futures.edited.interventions == (
+        *edited.interventions, "force:light=0,state=red@t=2.0",
+    )  # fmt: skip
+    write_run(tmp_path, branch_run(edited, futures))
+    verdict = verify_run(read_run(tmp_path), tmp_path, observations=True)
+    assert verdict.stands, [route.problems for route in verdict.routes]
 
 
 def off_route_m(run, points):
