@@ -58,7 +58,7 @@ AGENTS: dict[str, AgentEntry] = {
     ),
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="the learned policy that is shipped: cameras, LiDAR and prompt to waypoints",
+        summary="the paper's policy: cameras, LiDAR and prompt to waypoints",
         data="driveinsight/weights",
     ),
     "constant": AgentEntry(
