@@ -149,9 +149,9 @@ def test_one_batch_can_be_learnt_by_heart_to_5_cm():
     inputs = random_inputs(TINY, batch=4, rays=200)
     with torch.no_grad():
         targets = targets_for(policy(inputs))
-    optimiser = torch.optim.AdamW(policy.parameters(), lr=3e-3)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 300)
-    for _ in range(300):
+    optimiser = torch.optim.AdamW(policy.parameters(), lr=4e-3)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 400)
+    for _ in range(400):
         optimiser.zero_grad()
         terms = losses(policy(inputs), targets, LossConfig())
         terms["total"].backward()
