@@ -15,12 +15,16 @@ from rich.progress import (
 _LOOK_BACK_S = 300.0  # work goes in bursts: a rate over half a minute, rich's own, jumps about
 
 
-def work_bar(what: str, unit: str) -> Progress:
-    """A bar on stderr; a task's description says what is under way.
+def work_bar(
+    what: str, unit: str, *, console: Console | None = None, transient: bool = False
+) -> Progress:
+    """A bar; a task's description says what is under way.
 
     Args:
         what: Is being done.
         unit: Of what is counted.
+        console: Where it is shown; None for stderr.
+        transient: Whether it goes once the work is done: what comes of it is printed then.
     """
     return Progress(
         TextColumn(f"  {what}"),
@@ -30,6 +34,7 @@ def work_bar(what: str, unit: str) -> Progress:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.description}"),
-        console=Console(stderr=True),
+        console=console or Console(stderr=True),
         speed_estimate_period=_LOOK_BACK_S,
+        transient=transient,
     )

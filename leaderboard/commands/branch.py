@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.work_bar import work_bar
 
 if TYPE_CHECKING:
     from leaderboard.record import RouteRecord, RunRecord
@@ -76,11 +76,13 @@ class Branch:
         from leaderboard.replay import ReplayError
 
         try:
-            with _bar() as bar:
-                task = bar.add_task("", total=record.game_s)
-                futures = branch(
-                    run, record, self.at, edits, on_step=lambda s: bar.update(task, completed=s)
-                )
+            with work_bar("branching", "s", transient=True) as bar:
+                task = bar.add_task("", total=int(record.game_s))
+
+                def show(time_s: float) -> None:
+                    bar.update(task, completed=int(time_s))
+
+                futures = branch(run, record, self.at, edits, on_step=show)
             write_run(folder, branch_run(run, futures))
             picture = folder / "branch.png"
             write_branch_picture(picture, run, futures)
@@ -102,17 +104,6 @@ class Branch:
         while folder.exists():
             folder, number = self.folder / f"{name}-{number}", number + 1
         return folder
-
-
-def _bar() -> Progress:
-    return Progress(
-        TextColumn("  branching"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
 
 
 def _chosen(run: RunRecord, route_id: str, seed: int) -> RouteRecord:

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from leaderboard.commands.ending import UsageError, complain, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.work_bar import work_bar
 
 REPORT_HELP = """Write a run as one HTML page: tables, infractions on a map, replays of routes.
 
@@ -58,7 +58,8 @@ class Report:
         path = self.output or folder / "report.html"
         try:
             count = len(chosen_routes(run, self.route_ids))
-            with compile_progress(console), _bar(console) as bar:
+            bar = work_bar("replaying", "routes", console=console, transient=True)
+            with compile_progress(console), bar:
                 task = bar.add_task("", total=count)
                 page, films = make_report(run, self.route_ids, lambda film: bar.advance(task))
             size = write_report(path, page)
@@ -74,14 +75,3 @@ class Report:
             "open it in a browser"
         )
         return 0
-
-
-def _bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("  replaying"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )

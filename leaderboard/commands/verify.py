@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from leaderboard.commands.ending import EXIT_REFUTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.work_bar import work_bar
 
 if TYPE_CHECKING:
     from leaderboard.record import RunRecord
@@ -60,7 +60,8 @@ class Verify:
             raise UsageError(str(error)) from error
         try:
             run = read_run(self.path)
-            with compile_progress(console), _bar(console) as bar:
+            bar = work_bar("replaying", "routes", console=console, transient=True)
+            with compile_progress(console), bar:
                 task = bar.add_task("", total=len(run.routes))
                 verdict = verify_run(
                     run,
@@ -113,14 +114,3 @@ def _conclusion(verdict: Verdict, run: RunRecord, *, seen: bool) -> str:
     what = [f"{wrong} of {count} routes"] if wrong else []
     what += ["the run's files"] if verdict.problems else []
     return f"The claim does not stand ({claim}): {' and '.join(what)} differ."
-
-
-def _bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("  replaying"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )
