@@ -211,14 +211,17 @@ def test_a_digit_too_small_to_change_a_bit_is_found_too(folder, tmp_path, capsys
     shutil.copytree(folder, copy)
     path = copy / "routes" / "0001.json"
     text = path.read_text()
-    long = max(re.findall(r"-?\d+\.\d+", text), key=len)
-    digits = [long[:-1] + digit for digit in "0123456789" if digit != long[-1]]
-    same = [other for other in digits if float(other) == float(long)]
-    assert same  # 17 digits are more than a number of 64 bits needs
-    path.write_text(text.replace(long, same[0], 1))
+    # 17 digits are more than a number of 64 bits needs: another last one may be the same number
+    written, other = next(
+        (number, number[:-1] + digit)
+        for number in re.findall(r"-?\d+\.\d{13,}", text)
+        for digit in "0123456789"
+        if digit != number[-1] and float(number[:-1] + digit) == float(number)
+    )
+    path.write_text(text.replace(written, other, 1))
     assert main(["verify", str(copy)]) == 1
     shown = capsys.readouterr().out.replace("\n", " ")
-    assert f"0001.json has {same[0]}, a number that is written {long}" in shown
+    assert f"0001.json has {other}, a number that is written {written}" in shown
 
 
 def test_a_folder_without_a_run_is_a_wrong_request(tmp_path, capsys):
