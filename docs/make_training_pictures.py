@@ -47,7 +47,7 @@ def main() -> None:
     """Draws all towns and a scale."""
     figure, grid = plt.subplots(2, 4, figsize=(11.0, 6.0), layout="constrained")
     places = list(grid.flat)
-    for axes, name in zip(places, TRAINING_TOWNS, strict=False):
+    for axes, name in zip(places[:-1], TRAINING_TOWNS, strict=True):
         draw_town(axes, name)
     reach = max(max(np.abs([*axes.get_xlim(), *axes.get_ylim()])) for axes in places[:-1])
     for axes in places:
