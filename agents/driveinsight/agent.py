@@ -18,9 +18,10 @@ from agents import AgentSpecError
 from agents.base import Control, Observation, Requirements
 from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
 from agents.driveinsight.config import PolicyConfig
+from agents.driveinsight.explained import ExplainedAgent
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
-from agents.driveinsight.model import Policy
+from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
 from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
@@ -89,13 +90,8 @@ class DriveInsightAgent:
     ) -> tuple[Control, DriveInsightMemory]:
         """One decision."""
         config = self.policy.config
-        inputs = inputs_of(config, observation)
-        moment = Moment(
-            seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
-        )
-        changes = editing(self.policy, tap_edits(self._edits, moment))
-        with one_thread(), torch.inference_mode(), changes:
-            output = self.policy(inputs, self._bank(memory.frames))
+        with one_thread(), torch.inference_mode():
+            inputs, output = self._decide(observation, memory)
         frames = memory.frames
         if output.bev is not None and inputs.pose is not None:
             reach = config.memory_frames * self._every
@@ -112,6 +108,24 @@ class DriveInsightAgent:
             seed=memory.seed,
             decision=memory.decision + 1,
         )
+
+    def plan(self, observation: Observation, memory: DriveInsightMemory) -> Output:
+        """What the policy says where `act` would be asked, as part of torch's graph."""
+        return self._decide(observation, memory)[1]
+
+    def explainable(self) -> ExplainedAgent:
+        """What `agents.explain` looks at."""
+        return ExplainedAgent(self)
+
+    def _decide(
+        self, observation: Observation, memory: DriveInsightMemory
+    ) -> tuple[Inputs, Output]:
+        inputs = inputs_of(self.policy.config, observation)
+        moment = Moment(
+            seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
+        )
+        with editing(self.policy, tap_edits(self._edits, moment)):
+            return inputs, self.policy(inputs, self._bank(memory.frames))
 
     def _bank(self, frames: tuple[Frame, ...]) -> MemoryBank | None:
         """The frames that are whole multiples of the memory's step old."""

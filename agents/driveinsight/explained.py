@@ -1,0 +1,65 @@
+"""What the DriveInsight policy says of itself to `agents.explain`: its tokens, taps and maps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from torch import Tensor, nn
+
+from agents.base import Observation
+from agents.driveinsight.config import BEV, TOKENS, PolicyConfig
+from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
+from di_envs.sensors.camera_config import rig_of
+
+if TYPE_CHECKING:
+    from agents.driveinsight.agent import DriveInsightAgent
+
+
+class ExplainedAgent:
+    """The policy of an agent, with the edits that the agent makes inside it.
+
+    Taps show an activation as it comes, before an edit of that tap.
+    """
+
+    def __init__(self, agent: DriveInsightAgent) -> None:
+        self._agent = agent
+        self.anatomy = anatomy_of(agent.policy.config)
+
+    @property
+    def model(self) -> nn.Module:
+        """The network."""
+        return self._agent.policy
+
+    def waypoints(self, observation: Observation, memory: Any) -> Tensor:
+        """(T, 2) of a decision."""
+        return self._agent.plan(observation, memory).waypoints[0]
+
+
+def anatomy_of(config: PolicyConfig) -> Anatomy:
+    """Where the components that a policy is given, and its maps, are.
+
+    A component that the configuration never gives has a zero token, whatever happens: nothing
+    responds to it, and it is left out.
+    """
+    groups = {
+        name: TokenGroup(tap=f"prompt.taps.{name}", keys=(place, place + 1))
+        for place, name in enumerate(TOKENS[:-1])
+        if name in config.prompt
+    }
+    maps: dict[str, FeatureMap] = {}
+    if config.sensors:
+        first = TOKENS.index(BEV)
+        last = first + config.planner.bev_tokens**2
+        groups[BEV] = TokenGroup(tap="bev.tokens", keys=(first, last))
+        grid = config.grid
+        maps[BEV] = FeatureMap(
+            tap="memory.bev" if config.memory_frames else "fusion.bev",
+            extent_m=(grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m),
+        )
+    if config.camera is not None:
+        for item, camera in enumerate(rig_of(config.camera.rig).cameras):
+            maps[camera.name] = FeatureMap(tap="camera.features", item=item, camera=camera.name)
+    attention = (
+        f"planner.layers.{layer}.attention.weights" for layer in range(config.planner.layers)
+    )
+    return Anatomy(groups=groups, attention=tuple(attention), maps=maps)
