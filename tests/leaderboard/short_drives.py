@@ -1,0 +1,45 @@
+"""The first seconds of a drive as a run of its own: what a test needs of one, in little time."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from gymnasium.wrappers import TimeLimit
+
+from di_envs.suites import load_suite
+from leaderboard.episode import drive_route
+from leaderboard.jobs import Job, RunSpec
+from leaderboard.record import RunRecord
+from leaderboard.rules import rules_named
+from leaderboard.runner import new_run
+from leaderboard.setting_up import scene_of, set_up
+from leaderboard.wall_clock import Stopwatch
+
+
+def short_run(
+    agent: str,
+    decisions: int,
+    *,
+    suite: str = "toy",
+    route_id: str = "",
+    interventions: tuple[str, ...] = (),
+    **options: Any,
+) -> RunRecord:
+    """A run of the first decisions of one route, the suite's first where none is named."""
+    route_id = route_id or load_suite(suite).specs()[0].route_id
+    options = {"suite": suite, "route_ids": (route_id,), **options}
+    spec = RunSpec(agent=agent, options=options, interventions=interventions)
+    job = Job(index=0, route_id=route_id, seed=0)
+    with set_up(spec, Stopwatch()) as driver:
+        scene = scene_of(driver)
+        record = drive_route(
+            driver.interventions.around(TimeLimit(driver.env, decisions)),
+            lambda: driver.interventions.agent(agent),
+            job,
+            rules_named(spec.rules),
+            requires=driver.requires,
+            interventions=interventions,
+        )
+    run = new_run(spec, [job], load_suite(suite), scene)
+    return dataclasses.replace(run, routes=(record,))
