@@ -110,9 +110,7 @@ class Collect:
 
         total = share_of(self.frames, towns) * len(towns)
         began_s, driven = time.monotonic(), 0
-        outcomes = collect(
-            self.output, towns, self.frames, workers=self.workers, pool=self._pool()
-        )
+        outcomes = collect(self.output, towns, self.frames, workers=self.workers, pool=self._pool())
         with (
             interruptible() as interruption,
             work_bar("driving", "moments") as bar,
