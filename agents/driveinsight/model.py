@@ -89,6 +89,7 @@ class Policy(nn.Module):
         self.waypoints = Tap()
         given = torch.tensor([float(name in config.prompt) for name in COMPONENTS])
         self.register_buffer("given", torch.cat([given, torch.ones(1)]), persistent=False)
+        self.to(memory_format=torch.channels_last)  # in which CPUs and GPUs convolve faster
 
     given: Tensor
 
