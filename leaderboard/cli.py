@@ -17,6 +17,7 @@ from typing import Annotated, Any, get_args
 
 import tyro
 
+from leaderboard.commands.ablate import ABLATE_HELP, Ablate
 from leaderboard.commands.branch import BRANCH_HELP, Branch
 from leaderboard.commands.collect import COLLECT_HELP, Collect
 from leaderboard.commands.compare import COMPARE_HELP, Compare
@@ -52,6 +53,7 @@ Command = (
     | Annotated[ScoreByRules, tyro.conf.subcommand("score", description=SCORE_HELP)]
     | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]
     | Annotated[Branch, tyro.conf.subcommand("branch", description=BRANCH_HELP)]
+    | Annotated[Ablate, tyro.conf.subcommand("ablate", description=ABLATE_HELP)]
     | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
     | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]

@@ -1,7 +1,7 @@
 """A mean with its confidence interval over seeds: no table shows a number without its doubt.
 
-Source: Student, "The Probable Error of a Mean", Biometrika 1908; large degrees of freedom by the
-expansion of Abramowitz and Stegun, Handbook of Mathematical Functions 1964, 26.7.5.
+Source: Student, "The Probable Error of a Mean", Biometrika 1908; quantiles by the
+finite sums of Abramowitz and Stegun, Handbook of Mathematical Functions 1964, 26.7.3 and 26.7.4.
 """
 
 from __future__ import annotations
@@ -10,9 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# 97.5 % quantiles of Student's t for 1, 2, … 10 degrees of freedom
-_T_975 = (12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281)
-_Z_975 = 1.959963985
+_BISECTIONS = 80  # each halves the angle that holds the quantile: more than a float has digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,23 +24,39 @@ class Interval:
         return f"{self.mean:.1f}" + ("" if self.half_width is None else f" ± {self.half_width:.1f}")
 
 
-def t_quantile(degrees: int) -> float:
-    """The 97.5 % quantile of Student's t.
+def t_quantile(degrees: int, probability: float = 0.975) -> float:
+    """A quantile of Student's t.
+
+    Args:
+        degrees: Of freedom.
+        probability: 0.5 or more, below 1.
 
     Raises:
-        ValueError: If `degrees` of freedom are below 1.
+        ValueError: If `degrees` are below 1, or the probability is out of range.
     """
     if degrees < 1:
         raise ValueError(f"Student's t needs at least 1 degree of freedom, not {degrees}")
-    if degrees <= len(_T_975):
-        return _T_975[degrees - 1]
-    z = _Z_975
-    terms = (
-        (z**3 + z) / 4.0,
-        (5 * z**5 + 16 * z**3 + 3 * z) / 96.0,
-        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384.0,
-    )
-    return z + sum(term / degrees ** (power + 1) for power, term in enumerate(terms))
+    if not 0.5 <= probability < 1.0:
+        raise ValueError(f"a quantile is asked for in [0.5, 1), not at {probability}")
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if 0.5 * (1.0 + _within(middle, degrees)) < probability:
+            low = middle
+        else:
+            high = middle
+    return math.sqrt(degrees) * math.tan(low)
+
+
+def _within(angle: float, degrees: int) -> float:
+    """How probably |t| is below sqrt(degrees) * tan(angle), by the finite sums of 26.7.3 and 4."""
+    sin, cos = math.sin(angle), math.cos(angle)
+    odd = degrees % 2
+    total, term = 0.0, cos if odd else 1.0
+    for power in range(odd, degrees - 1, 2):
+        total += term
+        term *= cos * cos * (power + 1) / (power + 2)
+    return 2.0 / math.pi * (angle + sin * total) if odd else sin * total
 
 
 def mean_interval(values: Sequence[float]) -> Interval:

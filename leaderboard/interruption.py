@@ -38,7 +38,14 @@ class Interruption:
 
 @contextmanager
 def interruptible() -> Iterator[Interruption]:
-    """Within, signals ask for the run to stop; in the main thread, which alone gets them."""
+    """Within, signals ask for the run to stop; in the main thread, which alone gets them.
+
+    Within another `interruptible` it is the same one: who asks a run to stop asks the study, too.
+    """
+    outer = getattr(signal.getsignal(signal.SIGINT), "__self__", None)
+    if isinstance(outer, Interruption):
+        yield outer
+        return
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
         yield interruption

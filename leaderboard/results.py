@@ -162,7 +162,7 @@ def _write_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
         **route_to_json(record),
     }
     lines = (f" {json.dumps(key)}: {_compact(value)}" for key, value in content.items())
-    _write_text(routes / f"{record.index:04d}.json", "{\n" + ",\n".join(lines) + "\n}\n")
+    replace_file(routes / f"{record.index:04d}.json", "{\n" + ",\n".join(lines) + "\n}\n")
 
 
 def _compact(value: Any) -> str:
@@ -170,10 +170,10 @@ def _compact(value: Any) -> str:
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    _write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
-def _write_text(path: Path, text: str) -> None:
+def replace_file(path: Path, text: str) -> None:
     """Writes beside the file, then renames: the file is the old or the new one, never half."""
     with tempfile.NamedTemporaryFile(
         "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False

@@ -56,6 +56,7 @@ def evaluate(
     engine: Engine | None = None,
     existing: Existing = Existing.REFUSE,
     console: Console | None = None,
+    display: RunDisplay | None = None,
 ) -> RunRecord:
     """Drives every route of the environment with every seed; writes each as it is finished.
 
@@ -67,6 +68,7 @@ def evaluate(
         engine: Where the routes are driven; None for one process beside this one.
         existing: What to do with results in the folder.
         console: Where progress is shown.
+        display: What shows it; None for that of a single run.
 
     Returns:
         The run; not `complete` if it was interrupted (SIGINT or SIGTERM).
@@ -83,14 +85,14 @@ def evaluate(
             overwrite=existing is Existing.OVERWRITE,
             resume=existing is Existing.RESUME,
         )
-        with RunDisplay(console) as display:
+        with display or RunDisplay(console) as shown:
             evaluation = _Evaluation(
                 spec=spec,
                 seeds=seeds,
                 suite=suite,
                 folder=folder,
                 resume=existing is Existing.RESUME,
-                display=display,
+                display=shown,
             )
             engine = engine or LocalEngine()
             with closing(engine.run(spec, evaluation.jobs)) as events:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
 
 if TYPE_CHECKING:
-    from leaderboard.engines import Engine
     from leaderboard.record import RunRecord
     from leaderboard.runner import Existing
 
@@ -35,20 +35,11 @@ each route as it is finished: after Ctrl-C or a crash, the same command with --r
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(SceneArguments):
+class Evaluate(EngineArguments, SceneArguments):
     """The arguments of `driveinsight evaluate`."""
 
     seeds: Annotated[int, says("N", "1")] = 1
     """How many seeds to drive every route with: 3 means 0, 1 and 2."""
-
-    workers: Annotated[int, says("N", "1")] = 1
-    """Processes to drive in; the results are the same bits for any number."""
-
-    engine: Annotated[Literal["local", "ray"], says("local|ray", "local")] = "local"
-    """Where: on this machine, or on a Ray cluster (needs driveinsight[ray]); the same bits."""
-
-    address: Annotated[str | None, says("ADDRESS", "a cluster of this machine alone")] = None
-    """With --engine ray: a running cluster, such as `auto` or ray://head:10001."""
 
     route_ids: Annotated[tuple[str, ...], says("ID ...", "all")] = ()
     """Drive these routes only."""
@@ -62,24 +53,13 @@ class Evaluate(SceneArguments):
     resume: tyro.conf.FlagCreatePairsOff[bool] = False
     """Continue the run that the folder holds; start it if there is none."""
 
-    step_timeout: Annotated[float, says("S", "60")] = 60.0
-    """Wall-clock seconds that one decision of the agent may take."""
-
-    setup_timeout: Annotated[float, says("S", "300")] = 300.0
-    """Wall-clock seconds that making the agent, or loading the town, may take."""
-
-    route_timeout: Annotated[float, says("S", "7200")] = 7200.0
-    """Wall-clock seconds that a route may take. Who exceeds one of these is killed; the route is
-    tried once more, then left out of the means: it says nothing of the driving."""
-
     def run(self) -> int:
         """Evaluates; returns the exit code."""
-        if self.seeds < 1 or self.workers < 1:
-            raise UsageError("--seeds and --workers must be at least 1")
+        if self.seeds < 1:
+            raise UsageError("--seeds must be at least 1")
+        self.check_engine()
         if self.overwrite and self.resume:
             raise UsageError("--overwrite and --resume exclude each other: choose one")
-        if self.address and self.engine != "ray":
-            raise UsageError("--address is of a Ray cluster: add --engine ray")
         options, suite = self.choose(self.route_ids)
         folder = self.output or self._default_folder(suite.name)
 
@@ -96,7 +76,7 @@ class Evaluate(SceneArguments):
                 range(self.seeds),
                 suite=suite,
                 folder=folder,
-                engine=self._engine(),
+                engine=self.make_engine(),
                 existing=self._existing(),
             )
         except (SetupError, ResultsError) as error:
@@ -108,22 +88,6 @@ class Evaluate(SceneArguments):
             return EXIT_INTERRUPTED
         return EXIT_CRASHED if run.lost else 0
 
-    def _engine(self) -> Engine:
-        from leaderboard.engines import LocalEngine
-        from leaderboard.wall_clock import Limits
-
-        try:
-            limits = Limits(
-                step_s=self.step_timeout, setup_s=self.setup_timeout, route_s=self.route_timeout
-            )
-        except ValueError as error:
-            raise UsageError("--step-, --setup- and --route-timeout must be positive") from error
-        if self.engine == "local":
-            return LocalEngine(workers=self.workers, limits=limits)
-        from leaderboard.ray_engine import RayEngine
-
-        return RayEngine(workers=self.workers, limits=limits, address=self.address)
-
     def _existing(self) -> Existing:
         from leaderboard.runner import Existing
 
@@ -133,7 +97,7 @@ class Evaluate(SceneArguments):
 
     def _default_folder(self, suite: str) -> Path:
         """`results/AGENT-SUITE`, or -2 and so on where that is taken; the last one to resume."""
-        name = f"{_plain(self.agent)}-{_plain(suite)}"
+        name = f"{plain_name(self.agent)}-{plain_name(suite)}"
         folder, number = Path("results") / name, 2
         last = folder
         while folder.exists():
@@ -141,7 +105,7 @@ class Evaluate(SceneArguments):
         return last if self.resume else folder
 
 
-def _plain(name: str) -> str:
+def plain_name(name: str) -> str:
     """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
     last = name.rpartition(":")[2]
     return "".join(c if c.isalnum() or c in "_-." else "_" for c in last)

@@ -12,7 +12,7 @@ from leaderboard.confidence import mean_interval, t_quantile
 def test_the_interval_of_1_2_3_is_4_303_standard_errors_wide():
     interval = mean_interval([1.0, 2.0, 3.0])  # standard deviation 1
     assert interval.mean == 2.0
-    assert interval.half_width == pytest.approx(4.3027 / math.sqrt(3.0))
+    assert interval.half_width == pytest.approx(4.302653 / math.sqrt(3.0))
     assert str(interval) == "2.0 ± 2.5"
 
 
