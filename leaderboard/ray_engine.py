@@ -96,7 +96,7 @@ class RayEngine:
 
     def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
         """See `engines.Engine.run`."""
-        with _cluster(self) as ray:
+        with cluster(self.workers, self.address) as ray:
             crew = _Crew(self, ray, _absolute(spec), jobs)
             with contextlib.closing(crew):
                 while not crew.done:
@@ -243,24 +243,24 @@ def _own_cluster(workers: int) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _cluster(engine: RayEngine) -> Generator[Any]:
-    """Ray, connected to the cluster for as long as this lasts."""
+def cluster(workers: int, address: str | None) -> Generator[Any]:
+    """Ray, connected for as long as this lasts; see `RayEngine` for what it is told."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray asks nothing else, as it loads
     try:
         import ray
     except ImportError as error:
         raise SetupError(WITHOUT_RAY) from error
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    local = {} if engine.address else _own_cluster(engine.workers)
+    local = {} if address else _own_cluster(workers)
     try:
         ray.init(
-            address=engine.address or "local",
+            address=address or "local",
             log_to_driver=False,
             logging_level="error",
             **local,
         )
     except (ConnectionError, RuntimeError, ValueError) as error:
-        raise SetupError(f"there is no Ray cluster at '{engine.address}': {error}") from error
+        raise SetupError(f"there is no Ray cluster at '{address}': {error}") from error
     try:
         with contextlib.suppress(ValueError):  # only the main thread has handlers
             for number, handler in handlers.items():

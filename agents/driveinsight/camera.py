@@ -23,14 +23,14 @@ _DEVIATION = (58.395, 57.12, 57.375)
 class CameraEncoder(nn.Module):
     """Images of all cameras to one BEV feature map."""
 
-    mean: Tensor
-    deviation: Tensor
+    scale: Tensor
+    shift: Tensor
 
     def __init__(self, config: CameraEncoderConfig, grid: GridConfig) -> None:
         super().__init__()
-        self.register_buffer("mean", torch.tensor(_MEAN)[:, None, None], persistent=False)
-        deviation = torch.tensor(_DEVIATION)[:, None, None]
-        self.register_buffer("deviation", deviation, persistent=False)
+        scale = 1.0 / torch.tensor(_DEVIATION)[:, None, None]
+        self.register_buffer("scale", scale, persistent=False)
+        self.register_buffer("shift", -torch.tensor(_MEAN)[:, None, None] * scale, persistent=False)
         self.backbone = ResNet(config.block, config.depths, config.width)
         self._first = {4: 0, 8: 1, 16: 2}[config.stride]
         self.pyramid = FeaturePyramid(self.backbone.channels[self._first :], config.channels)
@@ -50,7 +50,7 @@ class CameraEncoder(nn.Module):
             The BEV features (B, C, X, Y), and the depth logits (B, N, D, h, w) they were lifted by.
         """
         batch, cameras = images.shape[:2]
-        flat = (images.flatten(0, 1).float() - self.mean) / self.deviation  # (B*N, 3, H, W)
+        flat = torch.addcmul(self.shift, images.flatten(0, 1).float(), self.scale)  # (B*N, 3, H, W)
         features = self.pyramid(self.backbone(flat)[self._first :])  # (B*N, C, h, w)
         features = self.features(features)
         logits = self.depth_net(features)  # (B*N, D, h, w)

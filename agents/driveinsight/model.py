@@ -89,6 +89,8 @@ class Policy(nn.Module):
         self.waypoints = Tap()
         given = torch.tensor([float(name in config.prompt) for name in COMPONENTS])
         self.register_buffer("given", torch.cat([given, torch.ones(1)]), persistent=False)
+        # in which CPUs and GPUs convolve faster; torch's stubs do not know the argument
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     given: Tensor
 

@@ -11,12 +11,13 @@ import json
 import multiprocessing
 import signal
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -59,6 +60,11 @@ class DriveJob:
         """What stands there instead when it is not worth keeping: why."""
         return self.path.with_suffix(".dropped.json")
 
+    @property
+    def done(self) -> bool:
+        """Whether it was driven before."""
+        return self.path.exists() or self.dropped_path.exists()
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -77,8 +83,32 @@ class Outcome:
     fresh: bool = False
 
 
+class Pending(Protocol):
+    """A drive that is on its way, as `concurrent.futures.Future` has it."""
+
+    def result(self) -> Outcome: ...
+    def cancel(self) -> bool: ...
+
+
+class Pool(Protocol):
+    """Whatever drives jobs at the same time: processes here, or a cluster."""
+
+    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending: ...
+
+
+def processes(workers: int) -> AbstractContextManager[Pool]:
+    """So many processes of this machine."""
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, context, ignore_interrupts)
+
+
 def collect(
-    folder: Path, towns: Sequence[str], frames: int, *, workers: int = 1
+    folder: Path,
+    towns: Sequence[str],
+    frames: int,
+    *,
+    workers: int = 1,
+    pool: AbstractContextManager[Pool] | None = None,
 ) -> Generator[Outcome, None, None]:
     """Drives until each town has its share of the moments; yields each drive as it is there.
 
@@ -88,16 +118,16 @@ def collect(
         folder: Where drives are kept; those that are there already count.
         towns: Names of training towns.
         frames: Moments in all.
-        workers: Processes.
+        workers: Drives at the same time.
+        pool: Where; None for processes of this machine.
 
     Raises:
         DriveFileError: If a file there is not whole.
     """
     share = share_of(frames, towns)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, ignore_interrupts) as pool:
+    with pool or processes(workers) as drivers:
         for town in towns:
-            yield from _collect_town(pool, folder, town, share, workers)
+            yield from _collect_town(drivers, folder, town, share, workers)
 
 
 def share_of(frames: int, towns: Sequence[str]) -> int:
@@ -120,7 +150,7 @@ def ignore_interrupts() -> None:
 
 
 def _collect_town(
-    pool: ProcessPoolExecutor, folder: Path, town: str, share: int, workers: int
+    pool: Pool, folder: Path, town: str, share: int, workers: int
 ) -> Iterator[Outcome]:
     """Drives in order of their numbers, a few ahead, until the first have enough moments."""
     jobs = (DriveJob(folder=folder, town=town, number=number) for number in range(10**6))

@@ -120,7 +120,17 @@ class Samples(Dataset[Sample]):
         row = key % len(self._chosen)
         drive = self._drive(int(self._chosen.drive[row]))
         moment = int(self._chosen.moment[row])
-        return self._renderer(drive).sample(drive, moment, self._training.varied, key)
+        return self._renderer(drive).sample(
+            drive, moment, self._training.varied, key, past=self._past(number)
+        )
+
+    def _past(self, number: int) -> int:
+        """Moments that are remembered: each number as often, and the same for a whole batch."""
+        frames, training = self._config.memory_frames, self._training
+        if training.overfit:
+            return frames
+        step = number // training.batch
+        return int(keyed_hash(training.seed, int(Stream.AGENT), step, 4)) % (frames + 1)
 
     def _drive(self, number: int) -> Drive:
         if number not in self._drives:

@@ -1,6 +1,6 @@
 """Training samples rendered from drives: what the policy sees, and what the expert did.
 
-A sample is a short sequence of moments 0.5 s apart, so that the memory has something to remember.
+A sample is a moment, and those before it that the memory remembers, 0.5 s apart.
 All that varies is drawn from the sample's key: weather, and how far the ego is set aside, with the
 expert's true path as the way back.
 """
@@ -35,10 +35,10 @@ from di_envs.town.town import Town
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """One sequence of T moments, oldest first: inputs and targets of each, batches of one."""
+    """What was seen at T moments, oldest first, and the targets of the newest; batches of one."""
 
     inputs: tuple[Inputs, ...]
-    targets: tuple[Targets, ...]
+    targets: Targets
 
 
 class Renderer:
@@ -50,7 +50,9 @@ class Renderer:
         self._rig = _with_depth(config)
         self._stages = functools.lru_cache(64)(self._stage)
 
-    def sample(self, drive: Drive, last: int, variation: Variation, key: int) -> Sample:
+    def sample(
+        self, drive: Drive, last: int, variation: Variation, key: int, *, past: int
+    ) -> Sample:
         """The moments that end at `last`.
 
         Args:
@@ -58,18 +60,17 @@ class Renderer:
             last: The newest moment.
             variation: How it is varied.
             key: Of all draws: equal keys give equal samples.
+            past: Moments before it, to be remembered; fewer at a drive's start.
         """
         right_m, turn_rad, weather = drawn(variation, key)
         stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
         observer.change_weather(weather)
-        first = max(last - self.config.memory_frames, 0)
-        inputs, targets = [], []
-        for moment in range(first, last + 1):
+        inputs = []
+        for moment in range(max(last - past, 0), last + 1):
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
             observation = observer.observe()
             inputs.append(inputs_of(self.config, observation))
-            targets.append(self._targets(drive, moment, stage, observation))
-        return Sample(inputs=tuple(inputs), targets=tuple(targets))
+        return Sample(inputs=tuple(inputs), targets=self._targets(drive, last, stage, observation))
 
     def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
         plan = self._plans[route_id]
@@ -133,28 +134,26 @@ class Batch:
 
     Attributes:
         inputs: Of each moment.
-        targets: Of each moment.
+        targets: Of the newest.
         begun: (T, B) 0 where the sample has no such moment: it repeats its first.
     """
 
     inputs: tuple[Inputs, ...]
-    targets: tuple[Targets, ...]
+    targets: Targets
     begun: Tensor
 
 
 def batch_of(samples: Sequence[Sample]) -> Batch:
     """Puts samples side by side; shorter ones repeat their first moment, which does not count."""
     length = max(len(sample.inputs) for sample in samples)
-    inputs, targets, begun = [], [], torch.ones(length, len(samples))
+    inputs, begun = [], torch.ones(length, len(samples))
     for t in range(length):
         places = [t - (length - len(sample.inputs)) for sample in samples]
         begun[t] = torch.tensor([float(place >= 0) for place in places])
-        chosen = [max(place, 0) for place in places]
-        pairs = list(zip(samples, chosen, strict=True))
-        inputs.append(_joined_inputs([sample.inputs[place] for sample, place in pairs]))
-        joined = _joined_targets([sample.targets[place] for sample, place in pairs])
-        targets.append(replace(joined, valid=joined.valid * begun[t][:, None]))
-    return Batch(inputs=tuple(inputs), targets=tuple(targets), begun=begun)
+        pairs = zip(samples, places, strict=True)
+        inputs.append(_joined_inputs([sample.inputs[max(place, 0)] for sample, place in pairs]))
+    targets = _joined_targets([sample.targets for sample in samples])
+    return Batch(inputs=tuple(inputs), targets=targets, begun=begun)
 
 
 def _joined(parts: Sequence[Tensor | None]) -> Tensor | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from agents.driveinsight.losses import LossConfig
 from agents.training.variation import NO_VARIATION, Variation
+from di_envs.config import check_name
 
 
 class TrainingError(Exception):
@@ -29,6 +30,7 @@ class TrainConfig:
         standing_share: Of moments at which the ego stands and will stand, this share is taken.
         overfit: Learn so many samples by heart, unvaried and with nothing hidden; 0 to learn all.
         threads: Of torch; another number gives other bits.
+        precision: `float32`, or `bfloat16` for products and convolutions (mixed precision).
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
@@ -45,6 +47,7 @@ class TrainConfig:
     standing_share: float = 0.3
     overfit: int = 0
     threads: int = 1
+    precision: str = "float32"
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""
@@ -57,6 +60,7 @@ class TrainConfig:
         for name in ("overfit", "warm_up"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        check_name(self.precision, ("float32", "bfloat16"), "precision")
         if not self.learning_rate > 0.0:
             raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
 

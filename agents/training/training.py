@@ -22,7 +22,8 @@ from torch import Tensor
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets, losses
-from agents.driveinsight.model import Output, Policy
+from agents.driveinsight.memory import MemoryBank
+from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.training.model_card import model_card
 from agents.training.samples import Batch, hidden_components
@@ -110,19 +111,20 @@ class Training:
             group["lr"] = self._learning_rate()
         self.policy.train()
         self.optimiser.zero_grad()
-        total: dict[str, float] = {}
-        for terms in self._terms(batch):
-            if not torch.isfinite(terms["total"]):
-                raise self._diverged(f"loss is {float(terms['total'].detach())}")
-            (terms["total"] / len(batch.inputs)).backward()
-            for name, value in terms.items():
-                total[name] = total.get(name, 0.0) + float(value.detach()) / len(batch.inputs)
+        hidden = self._hidden(len(batch.targets.waypoints))
+        output, targets = look(
+            self.policy, batch, hidden, mixed=self.config.precision == "bfloat16"
+        )
+        terms = losses(output, targets, self.config.loss)
+        if not torch.isfinite(terms["total"]):
+            raise self._diverged(f"loss is {float(terms['total'].detach())}")
+        terms["total"].backward()
         norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.config.clip)
         if not torch.isfinite(norm):
             raise self._diverged(f"gradient's norm is {float(norm)}")
         self.optimiser.step()
         self.step += 1
-        return total
+        return {name: float(value.detach()) for name, value in terms.items()}
 
     def _diverged(self, what: str) -> TrainingError:
         return TrainingError(
@@ -144,20 +146,13 @@ class Training:
         key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
         return hidden_components(self.policy.config, size, key)
 
-    def _terms(self, batch: Batch) -> Iterator[dict[str, Tensor]]:
-        """The loss of each moment."""
-        hidden = self._hidden(len(batch.targets[0].waypoints))
-        mixed = next(self.policy.parameters()).is_cuda
-        for output, targets in unroll(self.policy, batch, hidden, mixed=mixed):
-            yield losses(output, targets, self.config.loss)
 
-
-def unroll(
+def look(
     policy: Policy, batch: Batch, hidden: Tensor, *, mixed: bool = False
-) -> Iterator[tuple[Output, Targets]]:
-    """What a policy says at each moment of a batch, one after the other.
+) -> tuple[Output, Targets]:
+    """What a policy says at the newest moment of a batch, and the targets there.
 
-    Later moments remember earlier ones, without their gradients. A sample that begins later than
+    The moments before it are remembered, without their gradients. A sample that begins later than
     others, at its drive's start, remembers nothing of the time before.
 
     Args:
@@ -168,18 +163,24 @@ def unroll(
     """
     device = next(policy.parameters()).device
     hidden, bank = hidden.to(device), None
-    for t in range(len(batch.inputs)):
-        inputs, targets = _to(batch.inputs[t], device), _to(batch.targets[t], device)
-        seen = dataclasses.replace(inputs, present=inputs.present * hidden)
+
+    def seen(t: int, bank: MemoryBank | None) -> tuple[Output, Inputs]:
+        inputs = _to(batch.inputs[t], device)
+        inputs = dataclasses.replace(inputs, present=inputs.present * hidden)
         with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
-            output = policy(seen, bank)
-        yield output, targets
-        if policy.memory is not None and output.bev is not None and inputs.pose is not None:
-            bank = bank or policy.empty_bank(len(hidden), like=output.bev)
-            bank = bank.remember(output.bev.detach(), inputs.pose)
-            begun = batch.begun[t].bool().to(device)
-            valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
-            bank = dataclasses.replace(bank, valid=valid)
+            return policy(inputs, bank), inputs
+
+    for t in range(len(batch.inputs) - 1):
+        with torch.no_grad():
+            output, inputs = seen(t, bank)
+        assert output.bev is not None, "only a memory needs a past"
+        assert inputs.pose is not None
+        bank = bank or policy.empty_bank(len(hidden), like=output.bev)
+        bank = bank.remember(output.bev, inputs.pose)
+        begun = batch.begun[t].bool().to(device)
+        valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
+        bank = dataclasses.replace(bank, valid=valid)
+    return seen(len(batch.inputs) - 1, bank)[0], _to(batch.targets, device)
 
 
 def _to(values: Any, device: torch.device) -> Any:

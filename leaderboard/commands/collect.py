@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -16,11 +16,15 @@ from rich.table import Table
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 
+if TYPE_CHECKING:
+    from agents.training.collect import Pool
+
 COLLECT_HELP = """Let the expert drive in made-up towns, and keep what it did, to train policies on.
 
 Examples:
   driveinsight collect --frames 20000
   driveinsight collect --towns small_grid suburb --frames 5000 --workers 2 --output data
+  driveinsight collect --frames 1000000 --engine ray --workers 64 --address auto
 
 Kept are states, not pictures: about 1 kB each half second. Cameras and LiDAR are rendered from them
 while a policy is trained. Towns: small_grid, large_grid, suburb, highways, rural, downtown, mixed;
@@ -39,7 +43,14 @@ class Collect:
     """Towns to drive in."""
 
     workers: Annotated[int, says("N", "1")] = 1
-    """Processes to drive in; the files are the same for any number."""
+    """Drives at the same time; the files are the same for any number."""
+
+    engine: Annotated[Literal["local", "ray"], says("local|ray", "local")] = "local"
+    """Where: on this machine, or on a Ray cluster (needs driveinsight[ray]); the same files, and
+    they come here."""
+
+    address: Annotated[str | None, says("ADDRESS", "a cluster of this machine alone")] = None
+    """With --engine ray: a running cluster, such as `auto` or ray://head:10001."""
 
     output: Annotated[Path, says("DIR", "data")] = Path("data")
     """Folder for the drives."""
@@ -48,12 +59,15 @@ class Collect:
         """Collects; returns the exit code."""
         if self.frames < 1 or self.workers < 1:
             raise UsageError("--frames and --workers must be at least 1")
+        if self.address and self.engine != "ray":
+            raise UsageError("--address is of a Ray cluster: add --engine ray")
 
         from agents.training.collect import CARD_FILE, data_card, warm_up
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.towns import TRAINING_TOWNS
         from di_envs.config import check_name
         from leaderboard.compiling import compile_progress
+        from leaderboard.jobs import SetupError
 
         towns = tuple(dict.fromkeys(self.towns or TRAINING_TOWNS))
         try:
@@ -63,7 +77,7 @@ class Collect:
                 warm_up(towns[0])
             complete = self._collect(towns)
             card = data_card(self.output)
-        except (ValueError, OSError, DriveFileError) as error:
+        except (ValueError, OSError, DriveFileError, SetupError) as error:
             raise UsageError(str(error)) from error
         text = json.dumps(card, indent=1) + "\n"
         self.output.mkdir(parents=True, exist_ok=True)
@@ -80,6 +94,14 @@ class Collect:
         )
         return 0
 
+    def _pool(self) -> AbstractContextManager[Pool] | None:
+        """The cluster; None for processes of this machine."""
+        if self.engine == "local":
+            return None
+        from leaderboard.ray_collect import ray_pool
+
+        return ray_pool(self.workers, self.address)
+
     def _collect(self, towns: tuple[str, ...]) -> bool:
         """Drives; returns whether all is there."""
         from agents.training.collect import collect, share_of
@@ -88,7 +110,7 @@ class Collect:
 
         total = share_of(self.frames, towns) * len(towns)
         began_s, driven = time.monotonic(), 0
-        outcomes = collect(self.output, towns, self.frames, workers=self.workers)
+        outcomes = collect(self.output, towns, self.frames, workers=self.workers, pool=self._pool())
         with (
             interruptible() as interruption,
             work_bar("driving", "moments") as bar,

@@ -84,7 +84,12 @@ class Train:
     """Of fresh weights and of all that is drawn."""
 
     device: Annotated[Literal["auto", "cpu", "cuda"], says("auto|cpu|cuda", "auto")] = "auto"
-    """Where to train; auto takes a GPU if there is one, in mixed precision."""
+    """Where to train; auto takes a GPU if there is one."""
+
+    precision: Annotated[
+        Literal["auto", "float32", "bfloat16"], says("auto|float32|bfloat16", "auto")
+    ] = "auto"
+    """Of products and convolutions; auto takes bfloat16 where the hardware has it built in."""
 
     def run(self) -> int:
         """Trains; returns the exit code."""
@@ -136,6 +141,7 @@ class Train:
             seed=self.seed,
             overfit=self.overfit,
             threads=self.threads,
+            precision=self._precision(),
             init_from="" if self.init_from is None else weights_digest(self.init_from),
         )
 
@@ -174,15 +180,10 @@ class Train:
 
     def _begin(self, policy: PolicyConfig, config: TrainConfig, folder: Path) -> Training:
         """A fresh training, or the one that the folder holds."""
-        import torch
-
         from agents.driveinsight.weights import take_weights
         from agents.training.training import CHECKPOINT_FILE, Training
 
-        device = self.device
-        if device == "auto":
-            device = "cuda" if torch.cuda.is_available() else "cpu"
-        training = Training.begin(policy, config, device)
+        training = Training.begin(policy, config, self._device())
         if (folder / CHECKPOINT_FILE).exists():
             training.load(folder / CHECKPOINT_FILE)
             say(f"Goes on from step {training.step} of {folder}.")
@@ -193,6 +194,24 @@ class Train:
             if left:
                 say(f"Not taken, as nothing here has their name and shape: {_parts(left)}.")
         return training
+
+    def _device(self) -> str:
+        import torch
+
+        if self.device != "auto":
+            return self.device
+        return "cuda" if torch.cuda.is_available() else "cpu"
+
+    def _precision(self) -> str:
+        import torch
+
+        if self.precision != "auto":
+            return self.precision
+        if self._device() == "cuda":
+            fast = torch.cuda.is_bf16_supported(including_emulation=False)
+        else:
+            fast = torch.cpu.get_capabilities().get("amx_bf16", False)
+        return "bfloat16" if fast else "float32"
 
     @contextmanager
     def _checks(

@@ -31,8 +31,8 @@ from agents.training.training import (
     POLICY_FOLDER,
     Checks,
     Training,
+    look,
     train,
-    unroll,
 )
 
 SHORT = TrainConfig(steps=6, batch=3, warm_up=2)
@@ -211,8 +211,8 @@ def test_a_sample_at_a_drives_start_remembers_nothing_of_before_it(moments):
     renderer_of = Samples(SEEING, SHORT, moments)
     drive = renderer_of._drive(0)
     renderer = renderer_of._renderer(drive)
-    short = renderer.sample(drive, 0, SHORT.variation, key=7)
-    long = renderer.sample(drive, 40, SHORT.variation, key=8)
+    short = renderer.sample(drive, 0, SHORT.variation, key=7, past=2)
+    long = renderer.sample(drive, 40, SHORT.variation, key=8, past=2)
     assert (len(short.inputs), len(long.inputs)) == (1, 3)
     torch.manual_seed(0)
     policy = Policy(SEEING).eval()
@@ -221,7 +221,7 @@ def test_a_sample_at_a_drives_start_remembers_nothing_of_before_it(moments):
         batch = batch_of(samples)
         hidden = torch.ones(len(samples), 10)
         with torch.no_grad():
-            *_, (output, targets) = unroll(policy, batch, hidden)
+            output, targets = look(policy, batch, hidden)
         return output.waypoints, targets.valid, batch.begun
 
     together, valid, begun = last([short, long])
@@ -237,8 +237,8 @@ def test_mixed_precision_gives_whole_waypoints_near_the_exact_ones(moments):
     batch = batch_of([Samples(SEEING, SHORT, moments)[0]])
     hidden = torch.ones(1, 10)
     with torch.no_grad():
-        *_, (exact, _) = unroll(policy, batch, hidden)
-        *_, (mixed, targets) = unroll(policy, batch, hidden, mixed=True)
+        exact, _ = look(policy, batch, hidden)
+        mixed, targets = look(policy, batch, hidden, mixed=True)
     assert mixed.waypoints.dtype == torch.float32
     assert torch.allclose(exact.waypoints, mixed.waypoints, atol=0.2)
     terms = losses(mixed, targets, SHORT.loss)
