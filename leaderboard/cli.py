@@ -27,6 +27,7 @@ from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.export import EXPORT_HELP, Export
 from leaderboard.commands.lists import Agents, Suites
 from leaderboard.commands.report import REPORT_HELP, Report
+from leaderboard.commands.respond import RESPOND_HELP, Respond
 from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
 from leaderboard.commands.train import TRAIN_HELP, Train
@@ -54,6 +55,7 @@ Command = (
     | Annotated[Compare, tyro.conf.subcommand("compare", description=COMPARE_HELP)]
     | Annotated[Branch, tyro.conf.subcommand("branch", description=BRANCH_HELP)]
     | Annotated[Ablate, tyro.conf.subcommand("ablate", description=ABLATE_HELP)]
+    | Annotated[Respond, tyro.conf.subcommand("respond", description=RESPOND_HELP)]
     | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
     | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]

@@ -66,12 +66,13 @@ class Decision:
         return self.step.time_s
 
 
-def retrace_env(run: RunRecord, *, front: bool = False) -> RouteEnv:
+def retrace_env(run: RunRecord, *, front: bool = False, prompt: bool = False) -> RouteEnv:
     """An environment that shows what a run's agent saw.
 
     Args:
         run: The run.
         front: Whether it has a front camera even if the agent has no cameras.
+        prompt: Whether it shows the prompt even if the agent has none.
 
     Raises:
         ReplayError: If it cannot be made here.
@@ -81,6 +82,8 @@ def retrace_env(run: RunRecord, *, front: bool = False) -> RouteEnv:
         cameras = tuple(c for c in rig_of("small").cameras if c.name == FRONT)
         options["observations"] = (*options["observations"], "camera")
         options["cameras"] = Rig(cameras=cameras)
+    if prompt and "prompt" not in options["observations"]:
+        options["observations"] = (*options["observations"], "prompt")
     return replay_env(run, rules=run.rules, **options)
 
 

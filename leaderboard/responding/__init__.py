@@ -1,0 +1,1 @@
+"""Responses of a policy over recorded drives: measured, kept, drawn, and put to the test."""
