@@ -118,7 +118,7 @@ CLAIMS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tested:
+class Finding:
     """A claim and what was found.
 
     Attributes:
@@ -153,7 +153,7 @@ def verdict_on(ratio: Interval) -> str:
     return FAILS if ratio.high < SLIGHT else OPEN
 
 
-def tested(drives: Sequence[DriveResponses]) -> tuple[Tested, ...]:
+def examined(drives: Sequence[DriveResponses]) -> tuple[Finding, ...]:
     """Every claim on a component that the policy has, put to the test.
 
     Args:
@@ -166,7 +166,7 @@ def tested(drives: Sequence[DriveResponses]) -> tuple[Tested, ...]:
     claims = [claim for claim in CLAIMS if claim.component in groups]
     level = 1.0 - (1.0 - LEVEL) / len(claims) if claims else LEVEL
     return tuple(
-        Tested(
+        Finding(
             claim=claim,
             strength=_ratio(claim, drives, "strength", level),
             share=_ratio(claim, drives, "share", level),

@@ -18,6 +18,7 @@ from di_envs.route_env import RouteEnv
 from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.report import SHORT_NAMES
 from leaderboard.retracing import RetraceError, retrace, retrace_env
+from leaderboard.rules import rules_named
 
 EVERY_S = 0.5  # between two moments that are looked at, unless told otherwise
 
@@ -152,9 +153,9 @@ def drive_hash(record: RouteRecord) -> str:
     return hashlib.blake2b(repr(record.fingerprint()).encode(), digest_size=8).hexdigest()
 
 
-def _events(record: RouteRecord) -> tuple[tuple[float, str], ...]:
-    named = [event for event in record.events if event.kind in SHORT_NAMES]
-    return tuple((event.time_s, SHORT_NAMES[event.kind]) for event in named)
+def _events(run: RunRecord, record: RouteRecord) -> tuple[tuple[float, str], ...]:
+    counted = rules_named(run.rules).infractions
+    return tuple((e.time_s, SHORT_NAMES[e.kind]) for e in record.events if e.kind in counted)
 
 
 def _stacked(responses: list[Response], name: str) -> NDArray[np.float32]:

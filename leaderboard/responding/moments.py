@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from leaderboard.responding.drive_responses import DriveResponses
 
 MARKED = 3
 _APART_S = 2.0
+_BEFORE_S = 1.0  # when what went wrong was being decided
 _FIRST = ("turning", "obstacle", "light", "junction", "stop_sign", "free")
 
 
@@ -19,19 +20,27 @@ def marked_moments(drive: DriveResponses, at_s: Sequence[float] = ()) -> tuple[i
 
     Args:
         drive: The drive.
-        at_s: Game times that are wanted; the moments nearest to them are taken. Without any, the
-            middle of the longest stretch of each situation, until there are three.
+        at_s: Game times that are wanted; the moments nearest to them are taken. Without any, a
+            second before the first infraction, then the middle of the longest stretch of each
+            situation, until there are three.
     """
     if at_s:
         return tuple(sorted({int(np.abs(drive.time_s - time).argmin()) for time in at_s}))
     chosen: list[int] = []
+    for moment in _candidates(drive):
+        apart = (abs(drive.time_s[moment] - drive.time_s[other]) for other in chosen)
+        if len(chosen) < MARKED and all(gap >= _APART_S for gap in apart):
+            chosen.append(moment)
+    return tuple(sorted(chosen)) or (len(drive.time_s) // 2,)
+
+
+def _candidates(drive: DriveResponses) -> Iterator[int]:
+    for time_s, _ in drive.events[:1]:
+        yield int(np.abs(drive.time_s - (time_s - _BEFORE_S)).argmin())
     for situation in _FIRST:
         middle = _middle(drive.holding(situation))
-        if middle is None or len(chosen) == MARKED:
-            continue
-        if all(abs(drive.time_s[middle] - drive.time_s[other]) >= _APART_S for other in chosen):
-            chosen.append(middle)
-    return tuple(sorted(chosen)) or (len(drive.time_s) // 2,)
+        if middle is not None:
+            yield middle
 
 
 def stretches(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from leaderboard.responding.by_situation import ratios_in
 from leaderboard.responding.drive_responses import DriveResponses
@@ -87,7 +87,7 @@ def gradient_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
         axes.set_ylim(bottom=0.0)
         axes.yaxis.set_label_coords(-0.055, 0.5)
         _finish(axes, drive, marked)
-    rows[0].legend(loc="upper right", ncols=2, fontsize=8, frameon=False)
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=9, frameon=False)
     _situation_strips(rows[-1], drive)
     _finish(rows[-1], drive, marked, names=True)
     rows[-1].set_xlabel("game time [s]; G in metres of the mean waypoint per unit of token")
@@ -172,14 +172,16 @@ def situation_figure(drives: Sequence[DriveResponses]) -> Figure:
             axes.plot(ratio.value, height, "o", ms=4.5, color=colour, label=label)
     axes.axvline(1.0, color="black", lw=1.0)
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.tick_params(which="both", labelsize=7)
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(labelsize=8)
     axes.set_yticks(range(len(groups)), [_plain(name) for name in groups], fontsize=9)
     axes.invert_yaxis()
     axes.grid(axis="x", which="both", alpha=0.25)
     axes.set_xlabel("ratio of mean strengths, 95 % intervals over routes")
-    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    if shown:
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure
 
 

@@ -17,7 +17,7 @@ from rich.table import Table
 from agents.explain.situations import SAYS
 from leaderboard.resampling import Interval
 from leaderboard.responding.by_situation import by_situation, moments_of
-from leaderboard.responding.claims import LEVEL, SLIGHT, Tested, tested
+from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
 from leaderboard.responding.drive_responses import DriveResponses
 from leaderboard.responding.heads import HeadConsistency, head_consistency, verdict_of_heads
 
@@ -68,7 +68,7 @@ def tables_of(drives: Sequence[DriveResponses]) -> list[Rows]:
     heads = head_consistency(drives)
     tables = [situation_rows(drives)]
     if len(drives) > 1:
-        tables.append(claim_rows(tested(drives)))
+        tables.append(claim_rows(examined(drives)))
     return [*tables, head_rows(heads)] if heads is not None else tables
 
 
@@ -83,7 +83,7 @@ def write_tables(
     folder.mkdir(parents=True, exist_ok=True)
     text, numbers = folder / "responses.md", folder / "responses.json"
     text.write_text("\n".join(table.markdown() for table in tables), encoding="utf-8")
-    values = as_values(drives, tested(drives), head_consistency(drives))
+    values = as_values(drives, examined(drives), head_consistency(drives))
     numbers.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return text, numbers
 
@@ -107,7 +107,7 @@ def situation_rows(drives: Sequence[DriveResponses]) -> Rows:
     )
 
 
-def claim_rows(found: Sequence[Tested]) -> Rows:
+def claim_rows(found: Sequence[Finding]) -> Rows:
     """The paper's sentences, each with its numbers and verdict."""
     level = 100.0 * (1.0 - (1.0 - LEVEL) / max(len(found), 1))
     sentences = list(dict.fromkeys((each.claim.sentence, each.claim.source) for each in found))
@@ -167,7 +167,7 @@ def head_rows(found: HeadConsistency) -> Rows:
 
 
 def as_values(
-    drives: Sequence[DriveResponses], claims: Sequence[Tested], heads: HeadConsistency | None
+    drives: Sequence[DriveResponses], claims: Sequence[Finding], heads: HeadConsistency | None
 ) -> Mapping[str, object]:
     """All the numbers, as values that JSON has."""
     return {
