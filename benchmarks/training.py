@@ -96,7 +96,7 @@ def main(benchmark: Benchmark) -> None:
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         collected(Path(folder))
-        moments = load_moments(Path(folder) / "data", standing_share=0.3)
+        moments = load_moments([Path(folder) / "data"], standing_share=0.3)
         config = TrainConfig(steps=10**6, batch=BATCH)
         for name in CONFIGS:
             policy = config_named(name)

@@ -7,6 +7,7 @@ together have the moments asked for.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import multiprocessing
 import signal
@@ -22,8 +23,18 @@ from typing import Any, Protocol
 import numpy as np
 
 from agents import load_agent
-from agents.training.frames import FRAME_S, Drive, DriveLog, read_drive, write_drive, write_whole
-from agents.training.towns import TownFiles, town_files
+from agents.base import Agent
+from agents.training.corrections import corrected_drive
+from agents.training.frames import (
+    FRAME_S,
+    Drive,
+    DriveFileError,
+    DriveLog,
+    read_drive,
+    write_drive,
+    write_whole,
+)
+from agents.training.towns import town_files
 from di_envs.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
 from di_envs.town.plan import RoadOption
@@ -33,6 +44,7 @@ from di_envs.world.world import Event
 CARD_FILE = "card.json"
 WEATHER_NOTE = "none: it is drawn from 14 presets whenever a moment is rendered"
 STANDING_MPS = 0.1
+EXPERT = "expert"
 LEAST_MOMENTS = 10  # of a drive that is worth keeping
 # Infractions for which the paper drops a route; the metres outside lanes come as an event too.
 FAULTS = (
@@ -44,11 +56,19 @@ FAULTS = (
 
 @dataclass(frozen=True, kw_only=True)
 class DriveJob:
-    """One drive: the number says route and seed."""
+    """One drive: the number says route and seed.
+
+    Attributes:
+        folder: Where it is kept.
+        town: Name of the training town.
+        number: Of the drive in it.
+        driver: The agent that drives; any but `expert` is a learner, which the expert corrects.
+    """
 
     folder: Path
     town: str
     number: int
+    driver: str = EXPERT
 
     @property
     def path(self) -> Path:
@@ -107,6 +127,7 @@ def collect(
     towns: Sequence[str],
     frames: int,
     *,
+    driver: str = EXPERT,
     workers: int = 1,
     pool: AbstractContextManager[Pool] | None = None,
 ) -> Generator[Outcome, None, None]:
@@ -118,16 +139,21 @@ def collect(
         folder: Where drives are kept; those that are there already count.
         towns: Names of training towns.
         frames: Moments in all.
+        driver: See `DriveJob`.
         workers: Drives at the same time.
         pool: Where; None for processes of this machine.
 
     Raises:
-        DriveFileError: If a file there is not whole.
+        DriveFileError: If a file there is not whole, or of another driver.
     """
     share = share_of(frames, towns)
     with pool or processes(workers) as drivers:
         for town in towns:
-            yield from _collect_town(drivers, folder, town, share, workers)
+            jobs = (
+                DriveJob(folder=folder, town=town, number=number, driver=driver)
+                for number in range(10**6)
+            )
+            yield from _collect_town(drivers, jobs, share, workers)
 
 
 def share_of(frames: int, towns: Sequence[str]) -> int:
@@ -137,9 +163,9 @@ def share_of(frames: int, towns: Sequence[str]) -> int:
 
 def warm_up(town: str) -> None:
     """Makes a town, and has all kernels compiled that a drive needs."""
-    env, _ = _environment(town)
+    env = _environment(town, EXPERT)
     observation, _ = env.reset(seed=0)
-    agent = load_agent("expert")
+    agent = load_agent(EXPERT)
     control, _ = agent.act({**observation, "world": env.view}, agent.start(env.plan, 0))
     env.step(control)
 
@@ -150,10 +176,9 @@ def ignore_interrupts() -> None:
 
 
 def _collect_town(
-    pool: Pool, folder: Path, town: str, share: int, workers: int
+    pool: Pool, jobs: Iterator[DriveJob], share: int, workers: int
 ) -> Iterator[Outcome]:
     """Drives in order of their numbers, a few ahead, until the first have enough moments."""
-    jobs = (DriveJob(folder=folder, town=town, number=number) for number in range(10**6))
     ahead = [pool.submit(drive_job, next(jobs)) for _ in range(workers)]
     kept = 0
     try:
@@ -180,7 +205,13 @@ def drive_job(job: DriveJob) -> Outcome:
     if job.dropped_path.exists():
         return Outcome(job=job, moments=0, why=json.loads(job.dropped_path.read_text())["why"])
     if job.path.exists():
-        return Outcome(job=job, moments=len(read_drive(job.path)))
+        drive = read_drive(job.path)
+        if drive.facts.get("driver", EXPERT) != job.driver:
+            raise DriveFileError(
+                f"{job.path} was driven by {drive.facts.get('driver', EXPERT)}, not by "
+                f"{job.driver}: name another --output"
+            )
+        return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
         text = json.dumps({"why": why}) + "\n"
@@ -191,47 +222,67 @@ def drive_job(job: DriveJob) -> Outcome:
 
 
 @lru_cache(2)
-def _environment(town: str) -> tuple[RouteEnv, TownFiles]:
-    files = town_files(town)
-    return RouteEnv(observations=("prompt",), **files.options()), files
+def _environment(town: str, driver: str) -> RouteEnv:
+    requires = _driver(driver).requires
+    return RouteEnv(
+        observations=requires.observations,
+        control_dt_s=requires.control_dt_s,
+        **{**requires.options, **town_files(town).options()},
+    )
+
+
+@lru_cache(1)
+def _driver(driver: str) -> Agent[Any]:
+    return load_agent(driver)
 
 
 def _drive(job: DriveJob) -> tuple[Drive, str]:
-    """The expert's drive, and why it is not worth keeping; empty if it is."""
-    env, _ = _environment(job.town)
+    """A drive, and why it is not worth keeping; empty if it is."""
+    env = _environment(job.town, job.driver)
     seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
     observation, _ = env.reset(seed=seed, options={"route": job.number % len(env.route_ids)})
-    agent = load_agent("expert")
-    memory = agent.start(env.plan, seed)
-    every = round(FRAME_S / env.config.control_dt_s)
-    log, step, over = DriveLog(view=env.view), 0, False
-    events: list[Event] = []
-    info: dict[str, Any] = {"finished": ""}
-    while not over:
-        control, memory = agent.act({**observation, "world": env.view}, memory)
-        if step % every == 0:
-            log.add(control)
-        observation, _, terminated, truncated, info = env.step(control)
-        events += info["events"]
-        over, step = terminated or truncated, step + 1
+    shown = None
+    if job.driver == EXPERT:
+        log, events, finished = _driven(env, observation, seed)
+    else:
+        log, shown, events, finished = corrected_drive(env, _driver(job.driver), observation, seed)
     facts = {
         "town": job.town,
         "town_hash": env.world.town.content_hash,
         "number": job.number,
         "route_id": env.plan.route_id,
         "seed": seed,
-        "finished": info["finished"],
+        "finished": finished,
         "scenarios": _scenarios(events),
+        "driver": job.driver,
     }
-    drive = log.drive(facts)
-    if info["finished"] == "timeout":
+    drive = dataclasses.replace(log.drive(facts), shown=shown)
+    if finished == "timeout" and shown is None:
         drive = without_standing_tail(drive)
     faults = [event.kind.name.lower() for event in events if event.kind in FAULTS]
-    if faults:
+    if faults and shown is None:
         return drive, f"infractions: {', '.join(faults)}"
     if len(drive) < LEAST_MOMENTS:
         return drive, f"{len(drive)} moments only"
     return drive, ""
+
+
+def _driven(
+    env: RouteEnv, observation: dict[str, Any], seed: int
+) -> tuple[DriveLog, list[Event], str]:
+    """The expert drives a route that was just begun: the log, the events and how it ended."""
+    agent = _driver(EXPERT)
+    memory = agent.start(env.plan, seed)
+    every = round(FRAME_S / env.config.control_dt_s)
+    log, step, events, ended = DriveLog(view=env.view), 0, list[Event](), ""
+    while not ended:
+        control, memory = agent.act({**observation, "world": env.view}, memory)
+        if step % every == 0:
+            log.add(control)
+        observation, _, terminated, truncated, info = env.step(control)
+        events += info["events"]
+        ended, step = str(info["finished"]) if terminated or truncated else "", step + 1
+    return log, events, ended
 
 
 def without_standing_tail(drive: Drive) -> Drive:
@@ -257,11 +308,13 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         DriveFileError: If a file there is not whole.
     """
     towns, commands, scenarios = Counter[str](), Counter[str](), Counter[str]()
+    drivers = Counter[str]()
     for path in drive_paths(folder):
         drive = read_drive(path)
         towns[path.parent.name] += len(drive)
         scenarios.update(drive.facts["scenarios"])
         commands.update(_commands(drive))
+        drivers[drive.facts.get("driver", EXPERT)] += len(drive)
     dropped = Counter[str]()
     for path in sorted(folder.glob("*/*.dropped.json")):
         dropped[json.loads(path.read_text())["why"]] += 1
@@ -269,6 +322,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         "moments": sum(towns.values()),
         "seconds_apart": FRAME_S,
         "drives": len(drive_paths(folder)),
+        "by_driver": dict(drivers),
         "by_town": dict(sorted(towns.items())),
         "by_command": dict(commands.most_common()),
         "by_scenario": dict(sorted(scenarios.items())),
@@ -279,7 +333,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
 
 def _commands(drive: Drive) -> Counter[str]:
     """How many moments were driven under each command."""
-    env, _ = _environment(str(drive.facts["town"]))
+    env = _environment(str(drive.facts["town"]), EXPERT)
     plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])
     targets = drive.whole["target_index"][:, 0]
     options = plan.option[plan.targets[targets]]

@@ -53,6 +53,8 @@ class Drive:
         actor_id: (N,) which actor each row is of.
         first: (F + 1,) rows of moment f are [first[f], first[f + 1]).
         controls: (F, 3) throttle, steer, brake that the expert chose at the moment.
+        shown: Of a learner's drive: (F, W, 2) where the expert would have been afterwards, not a
+            number where that is not known; see `corrections`. None where the expert drove itself.
     """
 
     facts: dict[str, Any]
@@ -62,6 +64,7 @@ class Drive:
     actor_id: NDArray[np.int16]
     first: NDArray[np.int64]
     controls: NDArray[np.float32]
+    shown: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.first) - 1
@@ -85,7 +88,15 @@ class Drive:
             actor_id=self.actor_id[:rows],
             first=self.first[: moments + 1],
             controls=self.controls[:moments],
+            shown=None if self.shown is None else self.shown[:moments],
         )
+
+    def future(self, moment: int) -> NDArray[np.float64]:
+        """(W, 2) where the expert was each `FRAME_S` afterwards, as far as that is known."""
+        if self.shown is None:
+            return self.poses()[moment + 1 :, :2]
+        known = np.isfinite(self.shown[moment]).all(axis=1)
+        return self.shown[moment, known]
 
 
 def _whole_fields(capacity: Capacity) -> tuple[str, ...]:
@@ -185,6 +196,8 @@ def write_drive(path: Path, drive: Drive) -> None:
         "first": drive.first,
         "controls": drive.controls,
     }
+    if drive.shown is not None:
+        content["shown"] = drive.shown
     content |= {f"whole.{name}": values for name, values in drive.whole.items()}
     content |= {f"actors.{name}": values for name, values in drive.actors.items()}
     write_whole(path, lambda file: np.savez_compressed(file, **content))
@@ -227,6 +240,7 @@ def read_drive(path: Path) -> Drive:
             actor_id=content["actor_id"],
             first=content["first"],
             controls=content["controls"],
+            shown=content.get("shown"),
         )
     except DriveFileError:
         raise

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import signal
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.collect import drive_paths
-from agents.training.frames import Drive, DriveFileError, read_drive
+from agents.training.frames import FRAME_S, Drive, DriveFileError, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import load_training_town
 from agents.training.train_config import TrainConfig, TrainingError
@@ -57,20 +57,25 @@ class Moments:
         )
 
 
-def load_moments(folder: Path, standing_share: float) -> Moments:
-    """Finds the samples in a folder of drives.
+def load_moments(folders: Sequence[Path], standing_share: float) -> Moments:
+    """Finds the samples in folders of drives.
 
     Args:
-        folder: Where `collect` put them.
+        folders: Where `collect` put them.
         standing_share: See `TrainConfig`.
 
     Raises:
         TrainingError: If there is none.
         DriveFileError: If a file is not whole.
     """
-    paths = drive_paths(folder)
-    if not paths:
-        raise TrainingError(f"there are no drives in {folder}: run `driveinsight collect` first")
+    paths = []
+    for folder in folders:
+        found = drive_paths(folder)
+        if not found:
+            raise TrainingError(
+                f"there are no drives in {folder}: run `driveinsight collect` first"
+            )
+        paths += found
     digest = hashlib.blake2b(digest_size=16)
     pairs: list[tuple[int, int]] = []
     for number, path in enumerate(paths):
@@ -78,10 +83,12 @@ def load_moments(folder: Path, standing_share: float) -> Moments:
         facts = drive.facts
         digest.update(f"{facts['town']} {facts['number']} {facts['town_hash']}".encode())
         digest.update(drive.poses().tobytes())
+        if drive.shown is not None:
+            digest.update(drive.shown.tobytes())
         pairs += [(number, moment) for moment in _moments_of(drive, standing_share)]
     chosen = np.array(pairs, np.int64).reshape(-1, 2)
     if not len(chosen):
-        raise TrainingError(f"the drives in {folder} hold no moment to learn from: collect more")
+        raise TrainingError("the drives hold no moment to learn from: collect more")
     return Moments(
         paths=tuple(paths), drive=chosen[:, 0], moment=chosen[:, 1], digest=digest.hexdigest()
     )
@@ -90,8 +97,13 @@ def load_moments(folder: Path, standing_share: float) -> Moments:
 def _moments_of(drive: Drive, standing_share: float) -> Iterator[int]:
     """Those with a next one; of those in which the ego stands and stays, only a share."""
     speeds, number = drive.speeds(), int(drive.facts["number"])
-    for moment in range(len(drive) - 1):
-        stands = speeds[moment] < STANDING_MPS and speeds[moment + 1] < STANDING_MPS
+    places = drive.poses()[:, :2]
+    for moment in range(len(drive)):
+        future = drive.future(moment)[:1]
+        if not len(future):
+            continue
+        stays = np.hypot(*(future[0] - places[moment])) < STANDING_MPS * FRAME_S
+        stands = speeds[moment] < STANDING_MPS and stays
         if not stands or float(uniform(number, int(Stream.AGENT), moment, 1)) < standing_share:
             yield moment
 

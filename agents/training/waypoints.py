@@ -22,7 +22,7 @@ def expert_waypoints(
     Returns:
         (count, 2) x ahead, y right of `pose` [m], and (count,) 1 where the drive goes on so long.
     """
-    future = drive.poses()[moment + 1 : moment + 1 + count, :2] - pose[:2]
+    future = drive.future(moment)[:count] - pose[:2]
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     waypoints, valid = np.zeros((count, 2), np.float32), np.zeros(count, np.float32)
     known = len(future)

@@ -275,7 +275,8 @@ class World:
                 f"the snapshot has layout {snapshot.version} {snapshot.capacity}, this world has "
                 f"{STATE_VERSION} {capacity}; make the world with the same numbers of actors"
             )
-        self._allocate(snapshot.plans)
+        if self._view is None or self._view.plans is not snapshot.plans:
+            self._allocate(snapshot.plans)
         self._record.view(np.uint8)[...] = snapshot.record.view(np.uint8)
 
     def _capacity(self, plans: tuple[RoutePlan, ...]) -> Capacity:

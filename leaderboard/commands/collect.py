@@ -52,8 +52,12 @@ class Collect:
     address: Annotated[str | None, says("ADDRESS", "a cluster of this machine alone")] = None
     """With --engine ray: a running cluster, such as `auto` or ray://head:10001."""
 
+    driver: Annotated[str, says("AGENT", "expert")] = "expert"
+    """Who drives. With another agent, such as driveinsight:runs/small/policy, what is kept is what
+    the expert would have done from each moment of its drives: corrections of its mistakes."""
+
     output: Annotated[Path, says("DIR", "data")] = Path("data")
-    """Folder for the drives."""
+    """Folder for the drives of this driver."""
 
     def run(self) -> int:
         """Collects; returns the exit code."""
@@ -110,7 +114,14 @@ class Collect:
 
         total = share_of(self.frames, towns) * len(towns)
         began_s, driven = time.monotonic(), 0
-        outcomes = collect(self.output, towns, self.frames, workers=self.workers, pool=self._pool())
+        outcomes = collect(
+            self.output,
+            towns,
+            self.frames,
+            driver=self.driver,
+            workers=self.workers,
+            pool=self._pool(),
+        )
         with (
             interruptible() as interruption,
             work_bar("driving", "moments") as bar,

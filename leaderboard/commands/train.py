@@ -47,8 +47,8 @@ class Train:
     config: Annotated[str, says("NAME", "small")] = "small"
     """Configuration of the policy: tiny, small, small-prompt-only, paper, …"""
 
-    data: Annotated[Path, says("DIR", "data")] = Path("data")
-    """Folder of drives."""
+    data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
+    """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""
 
     output: Annotated[Path | None, says("DIR", "runs/CONFIG")] = None
     """Folder for all that is written."""
@@ -174,7 +174,7 @@ class Train:
                 on_step=show.step,
                 stop=lambda: interruption.requested,
                 checks=checks,
-                about_data=data_card(self.data),
+                about_data={str(folder): data_card(folder) for folder in self.data},
             )
         return _tell(training, folder) if done else _tell_stopped(training)
 

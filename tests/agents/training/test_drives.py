@@ -10,6 +10,7 @@ import pytest
 
 from agents import load_agent
 from agents.training.collect import (
+    DriveJob,
     Outcome,
     collect,
     data_card,
@@ -23,6 +24,8 @@ from agents.training.waypoints import expert_waypoints
 from di_envs.observation import Observer
 from di_envs.route_env import RouteEnv
 
+SAME = "agents.expert:Expert"  # under another name: a learner that needs no correction
+IDLE = "learners:Idle"
 GROUPS = ("camera", "lidar", "prompt", "odometry")
 
 
@@ -174,10 +177,9 @@ def test_collecting_gives_the_same_files_stopped_or_not_with_one_process_or_two(
 
 def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monkeypatch):
     from agents.training import collect as module
-    from agents.training.collect import DriveJob
 
     # the expert that heeds no light, in its place
-    monkeypatch.setattr(module, "load_agent", lambda name: load_agent("expert-redrunner"))
+    monkeypatch.setattr(module, "_driver", lambda name: load_agent("expert-redrunner"))
     outcomes = [
         drive_job(DriveJob(folder=tmp_path, town="small_grid", number=number))
         for number in range(4)
@@ -188,3 +190,29 @@ def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monke
     assert not job.path.exists()
     assert json.loads(job.dropped_path.read_text()) == {"why": dropped[0].why}
     assert drive_job(job) == Outcome(job=job, moments=0, why=dropped[0].why)
+
+
+def test_from_a_learners_moments_the_expert_shows_what_it_would_have_done(tmp_path):
+    """A learner that is the expert itself is shown its own way; one that stands still, to go."""
+    one = DriveJob(folder=tmp_path / "expert", town="small_grid", number=0)
+    other = dataclasses.replace(one, folder=tmp_path / "same", driver=SAME)
+    assert drive_job(one).moments == drive_job(other).moments > 20
+    driven, same = read_drive(one.path), read_drive(other.path)
+    assert same.facts["driver"] == SAME
+    np.testing.assert_array_equal(driven.poses(), same.poses())
+    for moment in (0, 7, len(driven) - 3):
+        future = driven.future(moment)[:8]
+        np.testing.assert_array_equal(same.future(moment)[: len(future)], future)
+    waiting = dataclasses.replace(one, folder=tmp_path / "idle", driver=IDLE)
+    drive_job(waiting)
+    idle = read_drive(waiting.path)
+    assert idle.facts["finished"] == "standing"
+    assert np.ptp(idle.poses()[:, :2], axis=0).max() < 0.5
+    assert max(np.hypot(*(idle.future(m)[-1] - idle.poses()[m, :2])) for m in range(60)) > 5.0
+
+
+def test_a_folder_holds_the_drives_of_one_driver(tmp_path):
+    job = DriveJob(folder=tmp_path, town="small_grid", number=0, driver=IDLE)
+    drive_job(job)
+    with pytest.raises(DriveFileError, match="name another --output"):
+        drive_job(dataclasses.replace(job, driver="expert"))

@@ -40,7 +40,7 @@ SHORT = TrainConfig(steps=6, batch=3, warm_up=2)
 
 @pytest.fixture(scope="module")
 def moments(drives):
-    return load_moments(drives, standing_share=0.3)
+    return load_moments([drives], standing_share=0.3)
 
 
 def trained(folder, policy, config, moments, *, stop_at=None, checks=None, workers=0):
@@ -168,12 +168,12 @@ def test_a_checkpoint_cut_off_says_what_to_do(tmp_path, moments):
 
 def test_no_drives_and_a_cut_off_drive_say_what_to_do(tmp_path, drives):
     with pytest.raises(TrainingError, match="run `driveinsight collect` first"):
-        load_moments(tmp_path, 0.3)
+        load_moments([tmp_path], 0.3)
     (tmp_path / "small_grid").mkdir()
     whole = drive_paths(drives)[0].read_bytes()
     (tmp_path / "small_grid" / "00000.npz").write_bytes(whole[:5000])
     with pytest.raises(DriveFileError, match="delete it and run collect again"):
-        load_moments(tmp_path, 0.3)
+        load_moments([tmp_path], 0.3)
 
 
 @pytest.mark.parametrize("workers", [0, 1])
@@ -181,7 +181,7 @@ def test_a_drive_that_goes_missing_meanwhile_is_named(tmp_path, drives, workers)
     (tmp_path / "small_grid").mkdir()
     path = tmp_path / "small_grid" / "00000.npz"
     path.write_bytes(drive_paths(drives)[0].read_bytes())
-    moments = load_moments(tmp_path, 0.3)
+    moments = load_moments([tmp_path], 0.3)
     path.unlink()
     data = batches(Samples(PROMPT_ONLY, SHORT, moments), SHORT.batch, workers=workers)
     with pytest.raises((TrainingError, DriveFileError), match=r"^[^\n]*00000.npz is missing"):

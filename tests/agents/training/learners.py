@@ -1,0 +1,20 @@
+"""A learner for the expert to correct: one that never moves."""
+
+from __future__ import annotations
+
+from agents.base import Requirements, make_control
+
+
+class Idle:
+    """Holds the brake."""
+
+    requires = Requirements()
+
+    def start(self, plan, seed):
+        return None
+
+    def act(self, observation, memory):
+        return make_control(0.0, 0.0, 1.0), memory
+
+    def close(self):
+        pass
