@@ -89,7 +89,7 @@ def _shown(
     places = np.full((SHOWN, 2), np.nan)
     every, state = round(FRAME_S / (ticks * TICK_S)), world.view.state
     for step in range(1, SHOWN * every + 1):
-        events = world.advance(control[None], ticks)
+        events = world.advance(control[None].astype(np.float64), ticks)
         if any(event.kind in _SPOILT for event in events):
             break
         if step % every == 0:
