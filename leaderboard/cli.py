@@ -24,6 +24,7 @@ from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
+from leaderboard.commands.explain import EXPLAIN_HELP, Explain
 from leaderboard.commands.export import EXPORT_HELP, Export
 from leaderboard.commands.lists import Agents, Suites
 from leaderboard.commands.report import REPORT_HELP, Report
@@ -56,6 +57,7 @@ Command = (
     | Annotated[Branch, tyro.conf.subcommand("branch", description=BRANCH_HELP)]
     | Annotated[Ablate, tyro.conf.subcommand("ablate", description=ABLATE_HELP)]
     | Annotated[Respond, tyro.conf.subcommand("respond", description=RESPOND_HELP)]
+    | Annotated[Explain, tyro.conf.subcommand("explain", description=EXPLAIN_HELP)]
     | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
     | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]

@@ -9,11 +9,12 @@ agent at a moment of a drive gets here what it had before it then.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from agents import AgentSpecError
 from agents.base import Agent, Control, Observation
@@ -32,12 +33,45 @@ from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
 from leaderboard.versions import agent_hash
 from wrappers.interventions.context import EditContext, context_of
+from wrappers.interventions.editing import Memory, ObservationEditing
 
 FRONT = "camera_front"
 
 
 class RetraceError(Exception):
     """A drive that the agent does not repeat here; the message says where, and why it may be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eyes:
+    """What an agent sees of an observation: its own part of it, edited. A value, like a memory.
+
+    Attributes:
+        keys: Entries that it sees at all.
+        edits: One after the other.
+        memory: What each of them remembers of the moments before.
+    """
+
+    keys: frozenset[str]
+    edits: tuple[ObservationEditing, ...] = ()
+    memory: tuple[Memory, ...] = ()
+
+    def behind(self, edit: ObservationEditing) -> Eyes:
+        """These eyes, and one more edit after those that there are, which has seen nothing yet."""
+        return replace(self, edits=(*self.edits, edit), memory=(*self.memory, edit.start()))
+
+    def look(
+        self, observation: Mapping[str, Any], context: EditContext
+    ) -> tuple[Mapping[str, Any], Eyes]:
+        """What is seen of an observation, and the eyes for the next moment."""
+        shown: Mapping[str, Any] = {
+            key: value for key, value in observation.items() if key in self.keys
+        }
+        kept = []
+        for edit, memory in zip(self.edits, self.memory, strict=True):
+            shown, after = edit.apply(shown, context, memory)
+            kept.append(after)
+        return shown, replace(self, memory=tuple(kept))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +82,7 @@ class Decision:
         number: How many decisions came before.
         step: The moment. Its world shows the next one once the next decision is asked for.
         seen: What the agent was handed: edited as in the run, without what it does not see.
+        eyes: With which it looked, as they were before it did.
         memory: What it remembered, before it decided.
         control: What it did, as recorded; None at the end of the route, where it did nothing.
         context: The moment, for edits.
@@ -56,6 +91,7 @@ class Decision:
     number: int
     step: ReplayStep
     seen: Observation
+    eyes: Eyes
     memory: Any
     control: Control | None
     context: EditContext
@@ -129,7 +165,8 @@ def retrace(
 ) -> Iterator[Decision]:
     """Drives a recorded route again with its agent, decision by decision.
 
-    Between two decisions the caller may step the environment, if it puts it back where it was.
+    At each yield the agent has not decided yet. Before it asks for more the caller may step the
+    environment, if it puts it back where it was.
 
     Args:
         run: The run that the record is of.
@@ -150,36 +187,79 @@ def retrace(
             f"{record.reason}"
         )
     env = env or retrace_env(run)
-    shown = _Shown(run, record, env)
+    eyes, checks = run_eyes(run, record, env), _checks(record)
     driver = agent or run_agent(run, env)
     try:
-        yield from _decisions(run, record, driver, env, shown)
+        yield from _decisions(run, record, driver, env, eyes, checks)
     finally:
         if agent is None:
             close_agent(driver)
 
 
+def run_eyes(run: RunRecord, record: RouteRecord, env: RouteEnv) -> Eyes:
+    """The eyes with which a route's agent looked at first.
+
+    Raises:
+        ReplayError: If the record's interventions cannot be made here.
+    """
+    space = own_space(run, env)
+    eyes = Eyes(keys=frozenset(space))
+    try:
+        texts = observation_interventions(record.interventions)
+        return eyes.behind(sort_interventions(texts, space).editing(space))
+    except EditError as error:
+        raise ReplayError(f"the record's interventions cannot be made here: {error}") from error
+
+
 def _decisions(
-    run: RunRecord, record: RouteRecord, agent: Agent[Any], env: RouteEnv, shown: _Shown
+    run: RunRecord,
+    record: RouteRecord,
+    agent: Agent[Any],
+    env: RouteEnv,
+    eyes: Eyes,
+    checks: NDArray[np.uint32],
 ) -> Iterator[Decision]:
     controls, memory = record.control_array(), None
+    dt_s = env.config.control_dt_s
     for step in replay(run, record, env=env):
         if step.decision == 0:
-            plan = plan_shown(agent.requires, env.plan)
-            memory = agent.start(plan, record.world_seed)
-        seen, context = shown.at(step)
-        seen = {**seen, **extra_keys(agent.requires, step.view)}
-        before, control = memory, None
-        if step.decision < len(controls):
-            control = controls[step.decision]
-            memory = _decided(run, agent, seen, before, control, step)
+            memory = agent.start(plan_shown(agent.requires, env.plan), record.world_seed)
+        before, context = eyes, context_of(step.info, dt_s)
+        shown, eyes = eyes.look(step.observation, context)
+        _check_seen(shown, int(checks[step.decision]), step)
+        seen = {**shown, **extra_keys(agent.requires, step.view)}
+        control = controls[step.decision] if step.decision < len(controls) else None
         yield Decision(
             number=step.decision,
             step=step,
             seen=seen,
-            memory=before,
+            eyes=before,
+            memory=memory,
             control=control,
             context=context,
+        )
+        if control is not None:
+            memory = _decided(run, agent, seen, memory, control, step)
+
+
+def _checks(record: RouteRecord) -> NDArray[np.uint32]:
+    try:
+        checks = record.check_array()
+    except ValueError as error:
+        raise ReplayError(f"the observations' hashes cannot be read: {error}") from error
+    if len(checks) != record.steps + 1:
+        raise ReplayError(
+            f"there are {len(checks)} hashes of observations for {record.steps} decisions"
+        )
+    return checks
+
+
+def _check_seen(shown: Mapping[str, Any], recorded: int, step: ReplayStep) -> None:
+    if observation_check(shown) != recorded:
+        raise RetraceError(
+            f"at {step.time_s:g} s the agent would see what it did not see in the run: the "
+            "package versions or the CPU are not those of the run; `driveinsight verify "
+            "--observations` says what differs"
         )
 
 
@@ -211,38 +291,3 @@ def _why(run: RunRecord) -> str:
             "them back, or evaluate again"
         )
     return "the package versions or the CPU are not those of the run; evaluate again here"
-
-
-class _Shown:
-    """What the agent was shown: its part of the observation, edited as in the run."""
-
-    def __init__(self, run: RunRecord, record: RouteRecord, env: RouteEnv) -> None:
-        self._dt_s, self._run = env.config.control_dt_s, run
-        space = own_space(run, env)
-        self._keys = frozenset(space)
-        try:
-            texts = observation_interventions(record.interventions)
-            self._editing = sort_interventions(texts, space).editing(space)
-            self._checks = record.check_array()
-        except EditError as error:
-            raise ReplayError(f"the record's interventions cannot be made here: {error}") from error
-        except ValueError as error:
-            raise ReplayError(f"the observations' hashes cannot be read: {error}") from error
-        if len(self._checks) != record.steps + 1:
-            raise ReplayError(
-                f"there are {len(self._checks)} hashes of observations for {record.steps} decisions"
-            )
-        self._memory = self._editing.start()
-
-    def at(self, step: ReplayStep) -> tuple[Mapping[str, Any], EditContext]:
-        """The observation at a moment, once it is sure that it is the recorded one."""
-        own = {key: value for key, value in step.observation.items() if key in self._keys}
-        context = context_of(step.info, self._dt_s)
-        shown, self._memory = self._editing.apply(own, context, self._memory)
-        if observation_check(shown) != int(self._checks[step.decision]):
-            raise RetraceError(
-                f"at {step.time_s:g} s the agent would see what it did not see in the run: the "
-                "package versions or the CPU are not those of the run; `driveinsight verify "
-                "--observations` says what differs"
-            )
-        return shown, context

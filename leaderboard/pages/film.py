@@ -155,9 +155,14 @@ def route_columns(plan: RoutePlan) -> dict[str, Column]:
     }
 
 
+def film_every(control_dt_s: float) -> int:
+    """How many decisions lie between two moments."""
+    return max(1, round(MOMENT_S / control_dt_s))
+
+
 def film_of(steps: Iterable[ReplayStep], control_dt_s: float) -> Film:
     """The film of a whole replay: a moment every `MOMENT_S` at least, and the last one."""
-    every = max(1, round(MOMENT_S / control_dt_s))
+    every = film_every(control_dt_s)
     film = Film()
     last_tick = -1
     step = None

@@ -38,7 +38,7 @@ from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-report", 1
 SCRIPTS = (
-    *("blocks.js", "film.js", "town.js", "scene.js", "player.js"),
+    *("blocks.js", "film.js", "town.js", "scene.js", "player.js", "transport.js"),
     *("tables.js", "overview.js", "report.js"),
 )
 AGREES_M = 0.002  # a trace is written to the millimetre
@@ -149,6 +149,7 @@ def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
         subtitle=joined([f"track {run.track} · rules {run.rules} · {run.town} · {seeds}"]),
         style=static_text("style.css"),
         notes=joined(element("p", note, class_="note") for note in _notes(run, films)),
+        **player_parts(),
         cards=summary_cards(run, records),
         routes=route_table(run, records, shown),
         events=event_table(run, records, shown),
@@ -158,6 +159,12 @@ def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
         blocks=joined(_block(film) for film in films if film.block),
         scripts=joined(element("script", Markup("\n" + static_text(name))) for name in SCRIPTS),
     )
+
+
+def player_parts() -> dict[str, str]:
+    """The parts of a page that its player takes, by their names in templates."""
+    names = {"stage": "stage", "aside": "now", "controls": "controls", "colours": "colours"}
+    return {part: static_text(f"{name}.html") for part, name in names.items()}
 
 
 def write_report(path: Path, page: str) -> int:
@@ -245,7 +252,6 @@ def _head(run: RunRecord, films: Sequence[RouteFilm]) -> dict[str, Any]:
 
 def _route_head(run: RunRecord, film: RouteFilm) -> dict[str, Any]:
     record = film.record
-    counted = set(shown_events(record, run))
     return {
         "block": f"block-{record.index}" if film.block else None,
         "route": record.route_id,
@@ -254,16 +260,22 @@ def _route_head(run: RunRecord, film: RouteFilm) -> dict[str, Any]:
         "problem": film.problem,
         "driving_score": record.score.driving_score,
         "game_s": record.game_s,
-        "events": [
-            {
-                "time_s": event.time_s,
-                "kind": event.kind.name.lower(),
-                "text": event_text(event),
-                "with": met(event),
-                "x": round(event.x, 2),
-                "y": round(event.y, 2),
-                "counts": event in counted,
-            }
-            for event in record.events
-        ],
+        "events": event_heads(record, run),
     }
+
+
+def event_heads(record: RouteRecord, run: RunRecord) -> list[dict[str, Any]]:
+    """A route's events as a page's script takes them."""
+    counted = set(shown_events(record, run))
+    return [
+        {
+            "time_s": event.time_s,
+            "kind": event.kind.name.lower(),
+            "text": event_text(event),
+            "with": met(event),
+            "x": round(event.x, 2),
+            "y": round(event.y, 2),
+            "counts": event in counted,
+        }
+        for event in record.events
+    ]

@@ -89,6 +89,18 @@ def test_other_weights_are_noticed_at_the_first_other_decision_and_named(run, we
         list(retrace(gone, run.routes[0]))
 
 
+def test_what_an_edit_remembers_is_a_value_of_the_eyes(weights):
+    run = short_run(f"driveinsight:{weights}", 12, interventions=("delay:speed,steps=5",), **BUSY)
+    speeds, again = [], []
+    for decision in retrace(run, run.routes[0]):
+        speeds.append(float(decision.step.observation["speed"][0]))
+        for _ in range(2):  # looking once more changes nothing
+            seen, _eyes = decision.eyes.look(decision.step.observation, decision.context)
+            assert seen["speed"] == decision.seen["speed"]
+        again.append(float(decision.seen["speed"][0]))
+    assert again[5:] == speeds[:-5]
+
+
 def test_another_control_or_another_look_is_noticed_where_it_is(run):
     record = run.routes[0]
     controls = record.control_array().copy()

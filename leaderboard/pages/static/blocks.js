@@ -17,27 +17,26 @@
     const head = JSON.parse(new TextDecoder().decode(data.subarray(0, end)));
     const columns = {};
     let at = end + 1;
-    for (const { name, count, step } of head.columns) {
-      columns[name] = numbers(data.subarray(at, at + PLANES * count), count, step);
+    for (const { name, count, step, differences = 2 } of head.columns) {
+      columns[name] = numbers(data.subarray(at, at + PLANES * count), count, step, differences);
       at += PLANES * count;
     }
     if (at !== data.length) throw new Error("the replay's data is damaged");
     return { meta: head.meta, columns };
   }
 
-  // Four planes of bytes -> folded differences of differences -> numbers
-  function numbers(bytes, count, step) {
+  // Four planes of bytes -> folded differences (of differences) -> numbers
+  function numbers(bytes, count, step, differences) {
     const values = new Float64Array(count);
-    let slope = 0;
-    let value = 0;
     for (let i = 0; i < count; i++) {
       const folded =
         bytes[i] | (bytes[count + i] << 8) | (bytes[2 * count + i] << 16) | (bytes[3 * count + i] << 24);
-      slope += (folded >>> 1) ^ -(folded & 1);
-      value += slope;
-      values[i] = value * step;
+      values[i] = (folded >>> 1) ^ -(folded & 1);
     }
-    return values;
+    for (let round = 0; round < differences; round++) {
+      for (let i = 1; i < count; i++) values[i] += values[i - 1];
+    }
+    return values.map((value) => value * step);
   }
 
   di.blocks = { read };

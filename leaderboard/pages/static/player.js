@@ -1,16 +1,20 @@
 "use strict";
 // Plays a film on a canvas: time, camera, pointer. Knows nothing of the page around it.
 //
-// const player = di.player.on(canvas, town, {on_time})
+// const player = di.player.on(canvas, town, {on_time, layers, turns})
+//   layers: what else is drawn, see scene.js; turns: whether the picture turns with the ego
 // player.show(film, time_s), player.seek(time_s), player.step(seconds), player.toggle(),
-// player.speed(factor), player.zoom(factor), player.follow(); player.time_s, player.playing
+// player.speed(factor), player.zoom(factor), player.follow(), player.turn(), player.paint();
+// player.time_s, player.playing, player.turns
 
 (function (di) {
   const SCALE = 7, SMALLEST = 1, LARGEST = 40; // pixels a metre
 
-  function on(canvas, town, { on_time = () => {} } = {}) {
+  const LEAD = 0.22; // of the canvas's height: the ego stands that much lower where all turns with it
+
+  function on(canvas, town, { on_time = () => {}, layers = {}, turns = false } = {}) {
     const context = canvas.getContext("2d");
-    const camera = { x: 0, y: 0, scale: SCALE };
+    const camera = { x: 0, y: 0, scale: SCALE, turn: 0 };
     const away = { x: 0, y: 0 }; // from the ego, by dragging [m]
     let colours = di.scene.look(canvas);
     let film = null;
@@ -46,9 +50,10 @@
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
       if (!width || !height) return;
       const now = film.at(time_s);
-      camera.x = now.ego.x + away.x;
-      camera.y = now.ego.y + away.y;
-      di.scene.draw(context, size, { town, film, now, camera, look: colours });
+      aim(camera, now.ego, turns ? LEAD * size.height : 0, turns);
+      camera.x += away.x;
+      camera.y += away.y;
+      di.scene.draw(context, size, { town, film, now, camera, look: colours, layers });
       on_time(now, playing);
     }
 
@@ -82,6 +87,13 @@
         camera.scale = Math.min(Math.max(camera.scale * by, SMALLEST), LARGEST);
         ask();
       },
+      turn() {
+        turns = !turns;
+        away.x = away.y = 0;
+        ask();
+        return turns;
+      },
+      paint: ask,
       follow() {
         away.x = away.y = 0;
         ask();
@@ -92,6 +104,9 @@
       get playing() {
         return playing;
       },
+      get turns() {
+        return turns;
+      },
     };
 
     canvas.addEventListener("wheel", (event) => {
@@ -101,8 +116,9 @@
     canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {
       if (!canvas.hasPointerCapture(event.pointerId)) return;
-      away.x -= event.movementX / camera.scale;
-      away.y -= event.movementY / camera.scale;
+      const [cos, sin] = [Math.cos(camera.turn), Math.sin(camera.turn)];
+      away.x -= (cos * event.movementX + sin * event.movementY) / camera.scale;
+      away.y -= (cos * event.movementY - sin * event.movementX) / camera.scale;
       ask();
     });
     new ResizeObserver(ask).observe(canvas);
@@ -113,5 +129,12 @@
     return player;
   }
 
-  di.player = { on };
+  // Looks at an ego from above: north up, or its heading up and some pixels more of what is ahead
+  function aim(camera, ego, lead_px, turns) {
+    camera.turn = turns ? -ego.yaw - Math.PI / 2 : 0;
+    camera.x = ego.x + (Math.cos(ego.yaw) * lead_px) / camera.scale;
+    camera.y = ego.y + (Math.sin(ego.yaw) * lead_px) / camera.scale;
+  }
+
+  di.player = { on, aim };
 })((globalThis.driveinsight ??= {}));

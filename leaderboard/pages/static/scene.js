@@ -1,9 +1,11 @@
 "use strict";
 // Draws a moment of a film from above.
 //
-// di.scene.draw(context, size, {town, film, now, camera, look})
-//   size: {width, height} in CSS pixels; camera: {x, y, scale} middle [m] and pixels a metre;
-//   look: colours by name, see di.scene.look(element)
+// di.scene.draw(context, size, {town, film, now, camera, look, layers})
+//   size: {width, height} in CSS pixels; camera: {x, y, scale, turn} middle [m], pixels a metre, and
+//   how far the picture is turned; look: colours by name, see di.scene.look(element);
+//   layers: {under, over, way}: functions (context, now, camera, look) that draw in metres on the
+//   streets and above all, and one that says whether the route is drawn
 
 (function (di) {
   const { ABOVE, BRAKES, LEFT, RIGHT } = di.film;
@@ -24,18 +26,21 @@
     return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
-  function draw(context, size, { town, film, now, camera, look }) {
+  function draw(context, size, { town, film, now, camera, look, layers = {} }) {
     const ratio = context.canvas.width / size.width;
     const to_pixels = () => {
       context.setTransform(ratio, 0, 0, ratio, 0, 0);
       context.translate(size.width / 2, size.height / 2);
       context.scale(camera.scale, camera.scale);
+      context.rotate(camera.turn ?? 0);
       context.translate(-camera.x, -camera.y);
     };
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = look.land;
     context.fillRect(0, 0, context.canvas.width, context.canvas.height);
-    const reach = [size.width / 2 / camera.scale, size.height / 2 / camera.scale];
+    const round = Math.hypot(size.width, size.height); // what a turned window lies within
+    const sides = camera.turn ? [round, round] : [size.width, size.height];
+    const reach = sides.map((side) => side / 2 / camera.scale);
     const window_cm = [
       (camera.x - reach[0]) * 100, (camera.y - reach[1]) * 100,
       (camera.x + reach[0]) * 100, (camera.y + reach[1]) * 100,
@@ -46,13 +51,15 @@
       streets(context, level, window_cm, look);
       stops(context, level, window_cm, now, look);
       to_pixels();
-      way(context, film, now, above, camera, look);
+      if (Boolean(now.ego.flags & ABOVE) === Boolean(above)) layers.under?.(context, now, camera, look);
+      if (layers.way?.() ?? true) way(context, film, now, above, camera, look);
       const walkers = now.actors.filter((actor) => actor.kind === "walker");
       const others = now.actors.filter((actor) => actor.kind !== "walker");
       for (const actor of [...others, now.ego, ...walkers]) {
         if (Boolean(actor.flags & ABOVE) === Boolean(above)) body(context, actor, camera, look, now.time_s);
       }
     });
+    layers.over?.(context, now, camera, look);
   }
 
   function streets(context, level, window_cm, look) {
@@ -169,5 +176,5 @@
     context.stroke();
   }
 
-  di.scene = { draw, look };
+  di.scene = { draw, look, disc };
 })((globalThis.driveinsight ??= {}));
