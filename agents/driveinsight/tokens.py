@@ -49,9 +49,10 @@ class SetEncoder(nn.Module):
 
     def forward(self, rows: Tensor, valid: Tensor) -> Tensor:
         """(..., K, F) rows and (..., K) 0 or 1 to (..., width); pools zeros where none is."""
-        encoded, mask = F.relu(self.row(rows)), valid[..., None]
-        largest = (encoded * mask).amax(dim=-2)  # ReLU: an invalid row is below any other
-        mean = (encoded * mask).sum(dim=-2) / mask.sum(dim=-2).clamp(min=1.0)
+        mask = valid[..., None]
+        encoded = F.relu(self.row(rows)) * mask
+        largest = encoded.amax(dim=-2)  # ReLU: an invalid row is below any other
+        mean = encoded.sum(dim=-2) / mask.sum(dim=-2).clamp(min=1.0)
         return self.join(torch.cat([largest, mean], dim=-1))
 
 
