@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 from short_drives import short_run
 
-from agents.driveinsight.config import config_named
+from agents.driveinsight.config import PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.responses import responses_at
@@ -28,13 +28,20 @@ from leaderboard.results import write_run
 from leaderboard.retracing import retrace, retrace_env, run_agent
 
 DECISIONS = 12
+CONFIG = PolicyConfig(
+    name="prompt",
+    camera=None,
+    lidar=None,
+    memory_frames=0,
+    planner=PlannerConfig(width=16, heads=2, layers=2),
+)
 
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory):
     torch.manual_seed(0)
     folder = tmp_path_factory.mktemp("policy")
-    save_pretrained(Policy(config_named("small-prompt-only")), folder, "a card")
+    save_pretrained(Policy(CONFIG), folder, "a card")
     return folder
 
 
@@ -58,7 +65,7 @@ def folder(run, tmp_path):
 def test_every_third_decision_is_looked_at_as_it_was_made(run, found):
     assert found.time_s == pytest.approx([0.0, 0.3, 0.6, 0.9])
     assert found.gradient.shape == (4, 9, 2)
-    assert found.attention.shape == (4, 3, 6, 9)
+    assert found.attention.shape == (4, 2, 2, 9)
     env = retrace_env(run)
     agent = run_agent(run, env)
     for decision in retrace(run, run.routes[0], env=env):
@@ -101,9 +108,8 @@ def test_one_route_is_drawn_and_its_moments_are_named(run, folder, capsys):
     written = folder / "responses"
     for name in ("gradients", "attention", "heads"):
         with Image.open(written / f"route-{route}-seed-0-{name}.png") as picture:
-            pixels = np.asarray(picture.convert("RGB"))
-        assert pixels.shape[1] > 600
-        assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 50  # something is drawn
+            assert picture.width > 500
+            assert len(picture.convert("RGB").getcolors(maxcolors=10**6)) > 50  # not a blank sheet
 
 
 def test_all_routes_are_measured_once_and_written_as_tables(folder, capsys, monkeypatch):
@@ -141,7 +147,7 @@ def test_what_cannot_be_done_is_refused_in_a_line(folder, capsys, arguments, hin
 
 def test_other_weights_are_not_taken_for_those_that_drove(folder, tmp_path, capsys):
     torch.manual_seed(1)
-    save_pretrained(Policy(config_named("small-prompt-only")), tmp_path / "other", "a card")
+    save_pretrained(Policy(CONFIG), tmp_path / "other", "a card")
     arguments = ["--routes", "all", "--agent", f"driveinsight:{tmp_path / 'other'}"]
     assert main(["respond", str(folder), *arguments]) == EXIT_USAGE
     assert "acts otherwise than recorded" in capsys.readouterr().err
