@@ -23,6 +23,8 @@ class TrainConfig:
         steps: Updates of the weights.
         batch: Samples a step; each is a sequence of `memory_frames + 1` moments.
         learning_rate: At its highest, after the warm-up; it falls to 0 along a cosine.
+        planner_rate: That of the prompt's encoders and the planner, as a share of it: below 1 where
+            they were trained before.
         warm_up: Steps over which it rises.
         weight_decay: AdamW's.
         clip: Largest norm of the gradient.
@@ -40,6 +42,7 @@ class TrainConfig:
     steps: int = 4000
     batch: int = 16
     learning_rate: float = 1e-3
+    planner_rate: float = 1.0
     warm_up: int = 200
     weight_decay: float = 1e-2
     clip: float = 5.0
@@ -63,6 +66,8 @@ class TrainConfig:
         check_name(self.precision, ("float32", "bfloat16"), "precision")
         if not self.learning_rate > 0.0:
             raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
+        if not self.planner_rate >= 0.0:
+            raise ValueError(f"planner_rate must not be negative, not {self.planner_rate}")
 
     @property
     def varied(self) -> Variation:

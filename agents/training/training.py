@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets, losses
@@ -37,6 +37,7 @@ CHECKS_FILE = "checks.csv"
 POLICY_FOLDER = "policy"
 LOG_EVERY = 20  # steps whose mean makes a row of the log
 CHECKPOINT_EVERY_S = 120.0
+_PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
 
 
 @dataclass(kw_only=True)
@@ -54,7 +55,7 @@ class Training:
         torch.manual_seed(config.seed)
         policy = Policy(policy_config).to(device)
         optimiser = torch.optim.AdamW(
-            policy.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+            _groups(policy, config), lr=config.learning_rate, weight_decay=config.weight_decay
         )
         return cls(policy=policy, optimiser=optimiser, config=config)
 
@@ -108,7 +109,7 @@ class Training:
             TrainingError: If the loss is not finite: the weights are left as they were.
         """
         for group in self.optimiser.param_groups:
-            group["lr"] = self._learning_rate()
+            group["lr"] = self._learning_rate() * group["rate"]
         self.policy.train()
         self.optimiser.zero_grad()
         hidden = self._hidden(len(batch.targets.waypoints))
@@ -145,6 +146,15 @@ class Training:
             return torch.ones(size, len(TOKENS))
         key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
         return hidden_components(self.policy.config, size, key)
+
+
+def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:
+    """Parameters by how fast they learn: those that see, and those that plan."""
+    seeing, planning = list[nn.Parameter](), list[nn.Parameter]()
+    for name, parameter in policy.named_parameters():
+        (planning if name.startswith(_PLANNING) else seeing).append(parameter)
+    groups = ((seeing, 1.0), (planning, config.planner_rate))
+    return [{"params": params, "rate": rate} for params, rate in groups if params]
 
 
 def look(

@@ -62,6 +62,10 @@ class Train:
     learning_rate: Annotated[float, says("X", "0.001")] = 1e-3
     """At its highest; after a warm-up it falls to 0 along a cosine."""
 
+    planner_rate: Annotated[float, says("X", "1")] = 1.0
+    """What the prompt's encoders and the planner learn at, as a share of it: less than 1 keeps
+    more of what they took from --init-from."""
+
     workers: Annotated[int | None, says("N", "cores - 1")] = None
     """Processes that render samples; 0 renders between steps. The bits are the same."""
 
@@ -137,6 +141,7 @@ class Train:
             steps=self.steps,
             batch=self.batch,
             learning_rate=self.learning_rate,
+            planner_rate=self.planner_rate,
             warm_up=min(200, self.steps // 10),
             seed=self.seed,
             overfit=self.overfit,
