@@ -1,4 +1,4 @@
-"""Inputs of the right shapes with random content, for networks that need not have learnt."""
+"""Inputs and targets of the right shapes with random content, for networks that learnt nothing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import torch
 from torch import Tensor
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
-from agents.driveinsight.model import Inputs
+from agents.driveinsight.losses import Targets
+from agents.driveinsight.model import Inputs, Output
+from agents.driveinsight.semantics import BevClass
 from di_envs.map_chunks import POINTS
 from di_envs.prompt import LIGHTS, MAP_POLYLINES, OBSTACLES, ROUTING_POINTS, STOP_SIGNS
 from di_envs.sensors.camera_config import rig_of
@@ -50,6 +52,23 @@ def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int
         images=images,
         points=points,
         pose=normal(3),
+    )
+
+
+def random_targets(output: Output, seed: int = 0) -> Targets:
+    """Targets for what a policy said."""
+    draw = torch.Generator().manual_seed(seed)
+    batch = len(output.waypoints)
+    steps = torch.rand(batch, 8, 2, generator=draw) * torch.tensor([4.0, 0.5])
+    cells = 48 if output.semantics is None else output.semantics.shape[-1]
+    semantics = torch.randint(0, len(BevClass), (batch, cells, cells), generator=draw)
+    return Targets(
+        waypoints=steps.cumsum(1),
+        valid=torch.ones(batch, 8),
+        semantics=semantics if output.semantics is not None else None,
+        depth=None
+        if output.depth is None
+        else torch.randint(-1, 24, output.depth[:, :, 0].shape, generator=draw),
     )
 
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 import torch
-from random_inputs import random_inputs, sample
+from random_inputs import random_inputs, random_targets, sample
 
 from agents.driveinsight.config import (
     CONFIGS,
@@ -18,9 +18,8 @@ from agents.driveinsight.config import (
     PolicyConfig,
     config_named,
 )
-from agents.driveinsight.losses import LossConfig, Targets, losses
+from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
-from agents.driveinsight.semantics import BevClass
 from agents.driveinsight.taps import editing, tap_names, watching
 from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
 
@@ -100,22 +99,6 @@ def test_memory_comes_in_and_goes_out_as_a_value(small):
     assert not torch.equal(remembered, forgetful)
 
 
-def targets_for(output, seed=0):
-    draw = torch.Generator().manual_seed(seed)
-    batch = len(output.waypoints)
-    steps = torch.rand(batch, 8, 2, generator=draw) * torch.tensor([4.0, 0.5])
-    cells = 48 if output.semantics is None else output.semantics.shape[-1]
-    semantics = torch.randint(0, len(BevClass), (batch, cells, cells), generator=draw)
-    return Targets(
-        waypoints=steps.cumsum(1),
-        valid=torch.ones(batch, 8),
-        semantics=semantics if output.semantics is not None else None,
-        depth=None
-        if output.depth is None
-        else torch.randint(-1, 24, output.depth[:, :, 0].shape, generator=draw),
-    )
-
-
 @pytest.mark.parametrize("name", SMALL)
 def test_gradients_reach_every_parameter(name):
     policy = new_policy(name).train()
@@ -125,7 +108,7 @@ def test_gradients_reach_every_parameter(name):
     if policy.memory is not None:
         bank = policy.empty_bank(2, like=output.bev).remember(output.bev, inputs.pose)
         output = policy(inputs, bank)
-    losses(output, targets_for(output), LossConfig())["total"].backward()
+    losses(output, random_targets(output), LossConfig())["total"].backward()
     without = [name for name, value in policy.named_parameters() if value.grad is None]
     assert without == []
     still = [n for n, v in policy.named_parameters() if not v.grad.abs().sum() > 0.0]
@@ -148,7 +131,7 @@ def test_one_batch_can_be_learnt_by_heart_to_5_cm():
     policy = Policy(TINY).train()
     inputs = random_inputs(TINY, batch=4, rays=200)
     with torch.no_grad():
-        targets = targets_for(policy(inputs))
+        targets = random_targets(policy(inputs))
     optimiser = torch.optim.AdamW(policy.parameters(), lr=4e-3)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 400)
     for _ in range(400):
@@ -165,7 +148,7 @@ def test_one_batch_can_be_learnt_by_heart_to_5_cm():
 def test_missing_waypoints_of_a_drive_that_ended_cost_nothing(small):
     with torch.inference_mode():
         output = small(random_inputs(small.config))
-    targets = targets_for(output)
+    targets = random_targets(output)
     targets.valid[:, 4:] = 0.0
     wrong = dataclasses.replace(targets, waypoints=targets.waypoints.clone())
     wrong.waypoints[:, 4:] += 100.0
