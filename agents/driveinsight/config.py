@@ -266,7 +266,14 @@ CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
                 grid=GridConfig(cells=24),
                 camera=CameraEncoderConfig(rig="rl", width=8, channels=16, depth_bins=12),
                 lidar=None,
-                planner=PlannerConfig(width=64, heads=4, layers=2, bev_tokens=6),
+                planner=PlannerConfig(
+                    width=64,
+                    heads=4,
+                    layers=2,
+                    bev_tokens=6,
+                    # minutes of training, for driving with all that there is: little is hidden
+                    dropout={component: rate / 4 for component, rate in DROPOUT.items()},
+                ),
                 memory_frames=0,
                 bev_width=16,
             ),
