@@ -68,7 +68,7 @@ def rendered(samples: Samples, name: str, count: int) -> None:
 
 def loaded(samples: Samples, name: str, count: int, workers: int) -> None:
     """Renders in other processes, and prints how fast by the clock."""
-    data = batches(samples, BATCH, workers=workers)
+    data = batches(samples, workers=workers)
     for _ in range(max(count // BATCH, 8 * workers)):
         next(data)
     began_s, moments = time.perf_counter(), 0
@@ -81,7 +81,7 @@ def loaded(samples: Samples, name: str, count: int, workers: int) -> None:
 
 def trained(samples: Samples, training: Training, name: str, steps: int) -> None:
     """Trains on batches that are there already, and prints how fast."""
-    data = batches(samples, BATCH)
+    data = batches(samples)
     ready = [next(data) for _ in range(steps + 1)]
     training.update(ready[0])
     began_s = time.process_time()

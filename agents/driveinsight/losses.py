@@ -55,3 +55,14 @@ def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Te
         entropy = F.cross_entropy(logits, targets.depth.flatten(0, 1).long(), ignore_index=-1)
         terms["depth"] = config.depth * entropy
     return {**terms, "total": torch.stack(list(terms.values())).sum()}
+
+
+def counts(targets: Targets) -> dict[str, Tensor]:
+    """By the names of `losses`, what each term is the mean over: parts of a batch weigh by it."""
+    found = {"waypoints": targets.valid.sum()}
+    if targets.semantics is not None:
+        weights = torch.tensor(_CLASS_WEIGHTS, device=targets.semantics.device)
+        found["semantics"] = weights[targets.semantics.long()].sum()
+    if targets.depth is not None:
+        found["depth"] = (targets.depth >= 0).sum()
+    return found

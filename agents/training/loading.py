@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import signal
+import zlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,12 @@ from torch.utils.data import DataLoader, Dataset
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.collect import drive_paths
+from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, Drive, DriveFileError, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import load_training_town
 from agents.training.train_config import TrainConfig, TrainingError
+from agents.training.variation import Variation
 from di_envs.keyed_random import Stream, keyed_hash, uniform
 
 STANDING_MPS = 0.1
@@ -38,12 +41,14 @@ class Moments:
         paths: Of the drives.
         drive: (M,) index of the drive of each.
         moment: (M,) which moment of it: the newest of a sample.
+        draws: (D,) a number of each drive, by its town and number: the lowest are held out.
         digest: Of all drives, so that a run goes on with the data that it began with.
     """
 
     paths: tuple[Path, ...]
     drive: NDArray[np.int64]
     moment: NDArray[np.int64]
+    draws: NDArray[np.float64]
     digest: str
 
     def __len__(self) -> int:
@@ -51,10 +56,29 @@ class Moments:
 
     def some(self, count: int) -> Moments:
         """So many of them, spread evenly: to see that a policy can learn them by heart."""
-        rows = ((np.arange(count) + 0.5) * len(self) / count).astype(np.int64)
-        return Moments(
-            paths=self.paths, drive=self.drive[rows], moment=self.moment[rows], digest=self.digest
-        )
+        return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
+
+    def held_out(self, share: float) -> tuple[Moments, Moments]:
+        """Those to learn from, and those of the drives kept out: at least one, at most half.
+
+        Raises:
+            TrainingError: If there are too few drives for that.
+        """
+        if not share:
+            return self, self._rows(np.zeros(0, np.int64))
+        drives = np.unique(self.drive)
+        draws = self.draws[drives]
+        count = min(max(int((draws < share).sum()), 1), len(drives) // 2)
+        kept_out = np.isin(self.drive, drives[np.argsort(draws, kind="stable")[:count]])
+        if not kept_out.any():
+            raise TrainingError(
+                "there is one drive alone, so none can be kept out of training to measure by: "
+                "collect more, or give --held-out 0"
+            )
+        return self._rows(np.flatnonzero(~kept_out)), self._rows(np.flatnonzero(kept_out))
+
+    def _rows(self, rows: NDArray[np.int64]) -> Moments:
+        return replace(self, drive=self.drive[rows], moment=self.moment[rows])
 
 
 def load_moments(folders: Sequence[Path], standing_share: float) -> Moments:
@@ -77,7 +101,7 @@ def load_moments(folders: Sequence[Path], standing_share: float) -> Moments:
             )
         paths += found
     digest = hashlib.blake2b(digest_size=16)
-    pairs: list[tuple[int, int]] = []
+    pairs, draws = list[tuple[int, int]](), list[float]()
     for number, path in enumerate(paths):
         drive = read_drive(path)
         facts = drive.facts
@@ -85,12 +109,18 @@ def load_moments(folders: Sequence[Path], standing_share: float) -> Moments:
         digest.update(drive.poses().tobytes())
         if drive.shown is not None:
             digest.update(drive.shown.tobytes())
+        name = zlib.crc32(f"{facts['town']} {facts['number']}".encode())
+        draws.append(float(uniform(name, int(Stream.AGENT), 0, 5)))
         pairs += [(number, moment) for moment in _moments_of(drive, standing_share)]
     chosen = np.array(pairs, np.int64).reshape(-1, 2)
     if not len(chosen):
         raise TrainingError("the drives hold no moment to learn from: collect more")
     return Moments(
-        paths=tuple(paths), drive=chosen[:, 0], moment=chosen[:, 1], digest=digest.hexdigest()
+        paths=tuple(paths),
+        drive=chosen[:, 0],
+        moment=chosen[:, 1],
+        draws=np.array(draws),
+        digest=digest.hexdigest(),
     )
 
 
@@ -111,35 +141,47 @@ def _moments_of(drive: Drive, standing_share: float) -> Iterator[int]:
 class Samples(Dataset[Sample]):
     """Samples by their number over the whole training: step x batch + place in it.
 
+    Numbers beyond the training's are the moments that it is measured on: unvaried but for weather,
+    and the same each time.
     Drives and towns are read when they are first wanted, and kept: a few kB a moment.
     """
 
     def __init__(self, config: PolicyConfig, training: TrainConfig, moments: Moments) -> None:
-        self._config, self._training, self._moments = config, training, moments
-        self._chosen = moments.some(training.overfit) if training.overfit else moments
+        self._config, self._moments = config, moments
+        self.training = training
+        taught, kept_out = moments.held_out(training.held_out)
+        self._chosen = taught.some(training.overfit) if training.overfit else taught
+        self._measured = kept_out.some(training.measured)
         self._drives: dict[int, Drive] = {}
         self._renderers: dict[str, Renderer] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what it is made from, without what it has read."""
-        return _samples, (self._config.to_mapping(), self._training, self._moments)
+        return _samples, (self._config.to_mapping(), self.training, self._moments)
 
     def __len__(self) -> int:
-        return self._training.steps * self._training.batch
+        return self.training.steps * self.training.batch
 
     def __getitem__(self, number: int) -> Sample:
-        key = int(keyed_hash(self._training.seed, int(Stream.AGENT), number, 2)) % 2**62
-        row = key % len(self._chosen)
-        drive = self._drive(int(self._chosen.drive[row]))
-        moment = int(self._chosen.moment[row])
-        return self._renderer(drive).sample(
-            drive, moment, self._training.varied, key, past=self._past(number)
-        )
+        training = self.training
+        key = int(keyed_hash(training.seed, int(Stream.AGENT), number, 2)) % 2**62
+        if number < len(self):
+            return self._sample(self._chosen, key % len(self._chosen), training.varied, key, number)
+        unmoved = replace(training.variation, share=0.0)
+        return self._sample(self._measured, number - len(self), unmoved, key, number)
+
+    def _sample(
+        self, moments: Moments, row: int, variation: Variation, key: int, number: int
+    ) -> Sample:
+        drive = self._drive(int(moments.drive[row]))
+        moment = int(moments.moment[row])
+        past = self._past(number)
+        return self._renderer(drive).sample(drive, moment, variation, key, past=past)
 
     def _past(self, number: int) -> int:
         """Moments that are remembered: each number as often, and the same for a whole batch."""
-        frames, training = self._config.memory_frames, self._training
-        if training.overfit:
+        frames, training = self._config.memory_frames, self.training
+        if training.overfit or number >= len(self):
             return frames
         step = number // training.batch
         return int(keyed_hash(training.seed, int(Stream.AGENT), step, 4)) % (frames + 1)
@@ -166,25 +208,43 @@ def _samples(config: Mapping[str, Any], training: TrainConfig, moments: Moments)
     return Samples(PolicyConfig.from_mapping(config), training, moments)
 
 
+def order(training: TrainConfig, first_step: int, share: slice) -> Iterator[int]:
+    """Numbers of samples from a step on; after some steps, of those that are measured on.
+
+    Args:
+        training: The whole of it.
+        first_step: Where to begin.
+        share: Rows of each batch that are wanted.
+    """
+    size, total = training.batch, training.steps * training.batch
+    for step in range(first_step, training.steps):
+        yield from range(step * size, (step + 1) * size)[share]
+        if training.measured_after(step + 1):
+            for first in range(total, total + training.measured, size):
+                yield from range(first, first + size)[share]
+
+
 def batches(
-    samples: Samples, batch: int, *, first_step: int = 0, workers: int = 0
+    samples: Samples, *, first_step: int = 0, workers: int = 0, team: Team = ALONE
 ) -> Generator[Batch, None, None]:
-    """Batches from a step on.
+    """Batches from a step on, and after some steps those that are measured on; see `order`.
 
     Args:
         samples: Of the whole training.
-        batch: Samples in one.
         first_step: Where to begin.
         workers: Processes that render ahead of time; 0 renders here.
+        team: Whose first, second, … part of each batch is wanted.
     """
+    training = samples.training
+    share = team.share(training.batch)
     ahead: dict[str, Any] = {}
     if workers:
         torch.multiprocessing.set_sharing_strategy("file_system")
         ahead = {"multiprocessing_context": "spawn", "prefetch_factor": PREFETCHED}
     loader = DataLoader(
         samples,
-        batch_size=batch,
-        sampler=range(first_step * batch, len(samples)),
+        batch_size=share.stop - share.start,
+        sampler=order(training, first_step, share),
         collate_fn=batch_of,
         num_workers=workers,
         worker_init_fn=_begin_worker,

@@ -10,6 +10,9 @@ from agents.driveinsight.losses import LossConfig
 from agents.training.variation import NO_VARIATION, Variation
 from di_envs.config import check_name
 
+MEASURED = 64  # moments of drives kept out of training that a policy is measured on …
+MEASURED_EVERY = 200  # … after so many steps
+
 
 class TrainingError(Exception):
     """Training cannot begin or go on; the message says why and what to do."""
@@ -33,6 +36,8 @@ class TrainConfig:
         overfit: Learn so many samples by heart, unvaried and with nothing hidden; 0 to learn all.
         threads: Of torch; another number gives other bits.
         precision: `float32`, or `bfloat16` for products and convolutions (mixed precision).
+        processes: That share each batch (`distributed`); another number gives other bits.
+        held_out: Share of the drives that is kept out of training, to measure by.
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
@@ -51,18 +56,27 @@ class TrainConfig:
     overfit: int = 0
     threads: int = 1
     precision: str = "float32"
+    processes: int = 1
+    held_out: float = 0.0
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""
     init_from: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("steps", "batch", "threads"):
+        for name in ("steps", "batch", "threads", "processes"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         for name in ("overfit", "warm_up"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if self.batch % self.processes:
+            raise ValueError(
+                f"{self.processes} processes cannot share batches of {self.batch} evenly: choose a "
+                f"multiple"
+            )
+        if not 0.0 <= self.held_out <= 0.5:
+            raise ValueError(f"held_out must be a share from 0 to 0.5, not {self.held_out}")
         check_name(self.precision, ("float32", "bfloat16"), "precision")
         if not self.learning_rate > 0.0:
             raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
@@ -73,6 +87,15 @@ class TrainConfig:
     def varied(self) -> Variation:
         """How samples are varied: not at all when they are learnt by heart."""
         return NO_VARIATION if self.overfit else self.variation
+
+    @property
+    def measured(self) -> int:
+        """Moments of the drives kept out that are looked at each time, in whole batches."""
+        return -(-MEASURED // self.batch) * self.batch if self.held_out else 0
+
+    def measured_after(self, step: int) -> bool:
+        """Whether the policy is measured on these after so many steps."""
+        return self.held_out > 0.0 and (step % MEASURED_EVERY == 0 or step == self.steps)
 
     def to_mapping(self) -> dict[str, Any]:
         """As plain values."""

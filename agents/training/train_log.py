@@ -6,11 +6,13 @@ import csv
 from collections.abc import Mapping
 from pathlib import Path
 
-Row = Mapping[str, float]
+HELD_OUT = "held_out"  # column: the waypoint loss [m] on drives kept out of training
+
+Row = Mapping[str, float | None]
 
 
 def append_row(path: Path, row: Row) -> None:
-    """Appends a row; the first one brings the names of the columns."""
+    """Appends a row; the first one brings the names of the columns, None leaves one empty."""
     fresh = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -20,24 +22,32 @@ def append_row(path: Path, row: Row) -> None:
 
 
 def read_rows(path: Path) -> list[dict[str, float]]:
-    """All rows; none if there is no file."""
+    """All rows, without what is empty in them; none if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+        return [
+            {name: float(text) for name, text in row.items() if text}
+            for row in csv.DictReader(file)
+        ]
 
 
 def forget_rows_after(path: Path, step: int) -> None:
     """Takes away what was written after a checkpoint: it comes again."""
-    rows = read_rows(path)
-    kept = [row for row in rows if row["step"] <= step]
+    if not path.exists():
+        return
+    with path.open(newline="", encoding="utf-8") as file:
+        names, *rows = list(csv.reader(file)) or [["step"]]
+    at = names.index("step")
+    kept = [row for row in rows if float(row[at]) <= step]
     if len(kept) < len(rows):
-        path.unlink()
-        for row in kept:
-            append_row(path, row)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([names, *kept])
 
 
-def _text(value: float) -> str:
+def _text(value: float | None) -> str:
+    if value is None:
+        return ""
     return str(int(value)) if float(value).is_integer() else f"{value:.6g}"
 
 
@@ -46,7 +56,7 @@ def write_curve(path: Path, log: list[dict[str, float]], checks: list[dict[str, 
 
     Args:
         path: A PNG.
-        log: Rows with `step` and loss terms.
+        log: Rows with `step` and loss terms, some with `HELD_OUT` too.
         checks: Rows with `step` and `driving_score`.
 
     Returns:
@@ -62,8 +72,13 @@ def write_curve(path: Path, log: list[dict[str, float]], checks: list[dict[str, 
     axes = figure.add_subplot()
     steps = [row["step"] for row in log]
     for name in log[0]:
-        if name != "step" and name != "total":
+        if name not in ("step", "total", HELD_OUT):
             axes.plot(steps, [row[name] for row in log], label=name, linewidth=1.0)
+    measured = [row for row in log if HELD_OUT in row]
+    if measured:
+        values = [row[HELD_OUT] for row in measured]
+        label = "waypoints, drives kept out"
+        axes.plot([row["step"] for row in measured], values, "k.--", label=label, linewidth=1.0)
     axes.set(xlabel="step", ylabel="loss (waypoints: m)", yscale="log")
     axes.grid(alpha=0.3)
     if checks:

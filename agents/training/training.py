@@ -21,14 +21,15 @@ import torch
 from torch import Tensor, nn
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
-from agents.driveinsight.losses import Targets, losses
+from agents.driveinsight.losses import Targets, counts, losses
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.weights import save_pretrained
+from agents.training.distributed import ALONE, Team
 from agents.training.model_card import model_card
 from agents.training.samples import Batch, hidden_components
 from agents.training.train_config import TrainConfig, TrainingError
-from agents.training.train_log import append_row, forget_rows_after, read_rows
+from agents.training.train_log import HELD_OUT, append_row, forget_rows_after, read_rows
 from di_envs.keyed_random import Stream, keyed_hash
 
 CHECKPOINT_FILE = "checkpoint.pt"
@@ -42,25 +43,34 @@ _PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
 
 @dataclass(kw_only=True)
 class Training:
-    """A policy being trained: all that a checkpoint holds."""
+    """A policy being trained: all that a checkpoint holds, and who trains it."""
 
     policy: Policy
     optimiser: torch.optim.Optimizer
     config: TrainConfig
     step: int = 0
+    team: Team = ALONE
 
     @classmethod
-    def begin(cls, policy_config: PolicyConfig, config: TrainConfig, device: str) -> Training:
+    def begin(
+        cls, policy_config: PolicyConfig, config: TrainConfig, device: str, team: Team = ALONE
+    ) -> Training:
         """Fresh weights, drawn from the seed."""
         torch.manual_seed(config.seed)
         policy = Policy(policy_config).to(device)
+        team.begin(policy)
         optimiser = torch.optim.AdamW(
             _groups(policy, config), lr=config.learning_rate, weight_decay=config.weight_decay
         )
-        return cls(policy=policy, optimiser=optimiser, config=config)
+        return cls(policy=policy, optimiser=optimiser, config=config, team=team)
 
     def save(self, path: Path) -> None:
-        """Writes a checkpoint; the old one stays until the new one is whole."""
+        """Writes a checkpoint; the old one stays until the new one is whole.
+
+        Of a team the first process does.
+        """
+        if not self.team.first:
+            return
         part = path.with_suffix(".part")
         torch.save(
             {
@@ -91,7 +101,8 @@ class Training:
             ) from error
         different = [
             *_differences(policy, self.policy.config.to_mapping()),
-            *_differences(config, self.config.to_mapping()),
+            # what a field did that is newer than the checkpoint is what its default does
+            *_differences({**TrainConfig().to_mapping(), **config}, self.config.to_mapping()),
         ]
         if different:
             raise TrainingError(
@@ -103,7 +114,7 @@ class Training:
         self.step = content["step"]
 
     def update(self, batch: Batch) -> dict[str, float]:
-        """One step on a batch; returns the terms of the loss.
+        """One step on a batch, or on a share of it; returns the terms of the whole batch's loss.
 
         Raises:
             TrainingError: If the loss is not finite: the weights are left as they were.
@@ -112,20 +123,44 @@ class Training:
             group["lr"] = self._learning_rate() * group["rate"]
         self.policy.train()
         self.optimiser.zero_grad()
-        hidden = self._hidden(len(batch.targets.waypoints))
-        output, targets = look(
-            self.policy, batch, hidden, mixed=self.config.precision == "bfloat16"
-        )
-        terms = losses(output, targets, self.config.loss)
-        if not torch.isfinite(terms["total"]):
-            raise self._diverged(f"loss is {float(terms['total'].detach())}")
+        hidden = self._hidden(self.config.batch)[self.team.share(self.config.batch)]
+        terms = self._terms(batch, hidden)
+        values = self.team.summed(terms)
+        if not math.isfinite(values["total"]):
+            raise self._diverged(f"loss is {values['total']}")
         terms["total"].backward()
+        self.team.sum_gradients(self.policy.parameters())
         norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.config.clip)
         if not torch.isfinite(norm):
             raise self._diverged(f"gradient's norm is {float(norm)}")
         self.optimiser.step()
         self.step += 1
-        return {name: float(value.detach()) for name, value in terms.items()}
+        return values
+
+    def measure(self, data: Iterator[Batch]) -> float:
+        """The mean waypoint loss on moments of drives kept out of training, nothing hidden [m].
+
+        Args:
+            data: Where these moments come next; see `loading.order`.
+        """
+        self.team.share_buffers(self.policy)
+        self.policy.eval()
+        looks = self.config.measured // self.config.batch
+        share = self.team.share(self.config.batch)
+        everything = torch.ones(share.stop - share.start, len(TOKENS))
+        with torch.no_grad():
+            found = [
+                self.team.summed(self._terms(next(data), everything))["waypoints"]
+                for _ in range(looks)
+            ]
+        return sum(found) / looks
+
+    def _terms(self, batch: Batch, hidden: Tensor) -> dict[str, Tensor]:
+        """The terms of the loss; of a share, such that they sum up to the whole batch's."""
+        mixed = self.config.precision == "bfloat16"
+        output, targets = look(self.policy, batch, hidden, mixed=mixed)
+        terms = losses(output, targets, self.config.loss)
+        return self.team.weighted(terms, counts(targets))
 
     def _diverged(self, what: str) -> TrainingError:
         return TrainingError(
@@ -255,17 +290,21 @@ def train(
     Raises:
         TrainingError: If the loss is not finite.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in (LOG_FILE, CHECKS_FILE):
-        forget_rows_after(folder / name, training.step)
+    team, config = training.team, training.config
+    if team.first:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in (LOG_FILE, CHECKS_FILE):
+            forget_rows_after(folder / name, training.step)
     keep = _keeper(training, folder, about_data or {})
-    saved_s, sums, count, last = time.monotonic(), dict[str, float](), 0, training.config.steps
+    saved_s, sums, count, last = time.monotonic(), dict[str, float](), 0, config.steps
     while True:
-        if checks and _due(training, checks, folder):
+        left = False
+        if checks and team.first and _due(training, checks, folder):
             training.save(folder / CHECKPOINT_FILE)
-            if not _check(training, checks, folder, keep):
-                return False
-        if training.step == last or stop():
+            left = not _check(training, checks, folder, keep)
+        if team.any(left):
+            return False
+        if training.step == last or team.any(stop()):
             break
         terms = training.update(next(data))
         on_step(training.step, terms)
@@ -273,15 +312,19 @@ def train(
             sums[name] = sums.get(name, 0.0) + value
         count += 1
         if training.step % LOG_EVERY == 0 or training.step == last:
-            row = {name: value / count for name, value in sums.items()}
-            append_row(folder / LOG_FILE, {"step": training.step, **row})
+            row: dict[str, float | None] = {name: value / count for name, value in sums.items()}
+            if config.held_out:
+                due = config.measured_after(training.step)
+                row[HELD_OUT] = training.measure(data) if due else None
+            if team.first:
+                append_row(folder / LOG_FILE, {"step": training.step, **row})
             sums, count = {}, 0
             # together with a row, so that rows are the same however often a run is cut off
             if time.monotonic() - saved_s > CHECKPOINT_EVERY_S:
                 training.save(folder / CHECKPOINT_FILE)
                 saved_s = time.monotonic()
     training.save(folder / CHECKPOINT_FILE)
-    if training.step == last and not checks:
+    if training.step == last and not checks and team.first:
         keep()
     return training.step == last
 

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +21,7 @@ from leaderboard.commands.scene_arguments import says
 if TYPE_CHECKING:
     from agents.driveinsight.config import PolicyConfig
     from agents.driveinsight.model import Policy
+    from agents.training.distributed import Team
     from agents.training.loading import Moments
     from agents.training.train_config import TrainConfig
     from agents.training.training import Checks, Training
@@ -33,6 +34,7 @@ Examples:
   driveinsight train --config small --data data --output runs/small
   driveinsight train --config small --init-from runs/small-prompt-only/policy
   driveinsight train --config small --overfit 1 --steps 300          can it learn at all?
+  torchrun --nproc-per-node 4 -m leaderboard train --config small    four processes, or GPUs
 
 Pictures are rendered while it trains, each sample in a weather of its own. Into --output go a
 checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores of routes that
@@ -67,13 +69,17 @@ class Train:
     more of what they took from --init-from."""
 
     workers: Annotated[int | None, says("N", "cores - 1")] = None
-    """Processes that render samples; 0 renders between steps. The bits are the same."""
+    """Processes that render samples; 0 renders between steps. The bits are the same. With torchrun:
+    of each of its processes."""
 
     threads: Annotated[int, says("N", "1")] = 1
     """Threads of torch on a CPU; another number gives other bits."""
 
     init_from: Annotated[Path | None, says("POLICY", "fresh weights")] = None
     """Begin with those tensors of another policy that have the same names and shapes."""
+
+    held_out: Annotated[float, says("SHARE", "0.05")] = 0.05
+    """Of the drives, kept out of training: their waypoint loss is in the log each 200 steps."""
 
     overfit: Annotated[int, says("N", "0")] = 0
     """Learn so many moments by heart, unvaried: the loss must fall to nearly nothing."""
@@ -105,23 +111,22 @@ class Train:
             ) from error
         self._check_numbers()
 
-        from agents.driveinsight.config import config_named
         from agents.driveinsight.weights import WeightsError
+        from agents.training.distributed import joined_team
         from agents.training.frames import DriveFileError
         from agents.training.loading import load_moments
         from agents.training.train_config import TrainingError
+        from agents.training.training import Training
         from leaderboard.training_check import CheckError
 
         torch.set_num_threads(self.threads)
         try:
-            policy, training = config_named(self.config), self._training_config()
-        except ValueError as error:
-            raise UsageError(str(error)) from error
-        try:
-            with Console(stderr=True).status("reading drives"):
-                moments = load_moments(self.data, training.standing_share)
-            training = dataclasses.replace(training, data=moments.digest)
-            return self._train(policy, training, moments)
+            with joined_team(self._device()) as (team, device), _one_talks(team):
+                policy, config = self._configs(team)
+                with Console(stderr=True).status("reading drives"):
+                    moments = load_moments(self.data, config.standing_share)
+                config = dataclasses.replace(config, data=moments.digest)
+                return self._train(Training.begin(policy, config, device, team), moments)
         except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
             raise UsageError(str(error)) from error
 
@@ -133,7 +138,15 @@ class Train:
         if self.threads < 1:
             raise UsageError("--threads must be at least 1")
 
-    def _training_config(self) -> TrainConfig:
+    def _configs(self, team: Team) -> tuple[PolicyConfig, TrainConfig]:
+        from agents.driveinsight.config import config_named
+
+        try:
+            return config_named(self.config), self._training_config(team)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+
+    def _training_config(self, team: Team) -> TrainConfig:
         from agents.driveinsight.weights import weights_digest
         from agents.training.train_config import TrainConfig
 
@@ -147,10 +160,12 @@ class Train:
             overfit=self.overfit,
             threads=self.threads,
             precision=self._precision(),
+            processes=team.size,
+            held_out=0.0 if self.overfit else self.held_out,
             init_from="" if self.init_from is None else weights_digest(self.init_from),
         )
 
-    def _train(self, policy: PolicyConfig, config: TrainConfig, moments: Moments) -> int:
+    def _train(self, training: Training, moments: Moments) -> int:
         from agents.training.collect import data_card
         from agents.training.loading import Samples, batches
         from agents.training.training import train
@@ -158,19 +173,20 @@ class Train:
         from leaderboard.interruption import interruptible
         from leaderboard.training_display import TrainingDisplay
 
+        policy, config, team = training.policy.config, training.config, training.team
         folder = self.output or Path("runs") / policy.name
-        training = self._begin(policy, config, folder)
+        self._go_on(training, folder)
         samples = Samples(policy, config, moments)
         with compile_progress(Console(stderr=True)):
-            samples[training.step * config.batch]  # before several processes need the same kernels
-        workers = max((os.cpu_count() or 2) - 1, 1) if self.workers is None else self.workers
-        data = batches(samples, config.batch, first_step=training.step, workers=workers)
+            samples[0]  # before several processes need the same kernels
+        workers = _free_cores() if self.workers is None else self.workers
+        data = batches(samples, first_step=training.step, workers=workers, team=team)
         show = TrainingDisplay(done=training.step, steps=config.steps, batch=config.batch)
         with (
             interruptible() as interruption,
             closing(data),
             show,
-            self._checks(policy, config, show, lambda: interruption.requested) as checks,
+            self._checks(training, show, lambda: interruption.requested) as checks,
         ):
             done = train(
                 training,
@@ -181,14 +197,15 @@ class Train:
                 checks=checks,
                 about_data={str(folder): data_card(folder) for folder in self.data},
             )
-        return _tell(training, folder) if done else _tell_stopped(training)
+        if not done:
+            return _tell_stopped(training)
+        return _tell(training, folder) if team.first else 0
 
-    def _begin(self, policy: PolicyConfig, config: TrainConfig, folder: Path) -> Training:
-        """A fresh training, or the one that the folder holds."""
+    def _go_on(self, training: Training, folder: Path) -> None:
+        """Goes on with the training that the folder holds, or with another policy's weights."""
         from agents.driveinsight.weights import take_weights
-        from agents.training.training import CHECKPOINT_FILE, Training
+        from agents.training.training import CHECKPOINT_FILE
 
-        training = Training.begin(policy, config, self._device())
         if (folder / CHECKPOINT_FILE).exists():
             training.load(folder / CHECKPOINT_FILE)
             say(f"Goes on from step {training.step} of {folder}.")
@@ -198,7 +215,6 @@ class Train:
             say(f"Taken from {self.init_from}: {len(taken)} of {total} tensors: {_parts(taken)}.")
             if left:
                 say(f"Not taken, as nothing here has their name and shape: {_parts(left)}.")
-        return training
 
     def _device(self) -> str:
         import torch
@@ -220,23 +236,23 @@ class Train:
 
     @contextmanager
     def _checks(
-        self,
-        policy: PolicyConfig,
-        config: TrainConfig,
-        show: TrainingDisplay,
-        stop: Callable[[], bool],
+        self, training: Training, show: TrainingDisplay, stop: Callable[[], bool]
     ) -> Iterator[Checks | None]:
         from agents.training.training import Checks
         from leaderboard.training_check import ClosedLoopCheck
 
-        if not self.check_routes or self.overfit:
+        if not self.check_routes or self.overfit or not training.team.first:
             yield None
             return
-        every = self.check_every or max(config.steps // 5, 1)
+        every = self.check_every or max(training.config.steps // 5, 1)
         with (
             TemporaryDirectory(prefix="driveinsight-") as folder,
             ClosedLoopCheck(
-                policy, Path(folder), self.check_routes, stop=stop, on_route=show.route
+                training.policy.config,
+                Path(folder),
+                self.check_routes,
+                stop=stop,
+                on_route=show.route,
             ) as check,
         ):
 
@@ -247,6 +263,22 @@ class Train:
                 return found
 
             yield Checks(every=every, score=score)
+
+
+@contextmanager
+def _one_talks(team: Team) -> Iterator[None]:
+    """Of a team only the first process is heard, but for errors."""
+    if team.first:
+        yield
+        return
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        yield
+
+
+def _free_cores() -> int:
+    """Those that are left when each process of this machine's team has one; at least one each."""
+    together = int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
+    return max((os.cpu_count() or 2) // together - 1, 1)
 
 
 def _parts(names: Sequence[str]) -> str:
@@ -264,13 +296,15 @@ def _tell_stopped(training: Training) -> int:
 
 
 def _tell(training: Training, folder: Path) -> int:
-    from agents.training.train_log import read_rows, write_curve
+    from agents.training.train_log import HELD_OUT, read_rows, write_curve
     from agents.training.training import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     log, checked = read_rows(folder / LOG_FILE), read_rows(folder / CHECKS_FILE)
     curve = folder / "curve.png"
     drawn = write_curve(curve, log, checked)
-    say(f"Trained {training.step} steps; waypoint loss {log[-1]['waypoints']:.3f} m at the end.")
+    kept_out = f" (drives kept out: {log[-1][HELD_OUT]:.3f} m)" if HELD_OUT in log[-1] else ""
+    loss = f"{log[-1]['waypoints']:.3f} m at the end{kept_out}"
+    say(f"Trained {training.step} steps; waypoint loss {loss}.")
     if checked:
         best = max(checked, key=lambda row: row["driving_score"])
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")

@@ -19,11 +19,11 @@ from agents.driveinsight.weights import (
     weights_digest,
 )
 from agents.training.collect import drive_paths
-from agents.training.frames import DriveFileError
+from agents.training.frames import DriveFileError, read_drive
 from agents.training.loading import Samples, batches, load_moments
 from agents.training.samples import batch_of, hidden_components
 from agents.training.train_config import TrainConfig, TrainingError
-from agents.training.train_log import read_rows
+from agents.training.train_log import HELD_OUT, forget_rows_after, read_rows, write_curve
 from agents.training.training import (
     CHECKPOINT_FILE,
     CHECKS_FILE,
@@ -34,6 +34,7 @@ from agents.training.training import (
     look,
     train,
 )
+from agents.training.waypoints import expert_waypoints
 
 SHORT = TrainConfig(steps=6, batch=3, warm_up=2)
 
@@ -48,12 +49,8 @@ def trained(folder, policy, config, moments, *, stop_at=None, checks=None, worke
     training = Training.begin(policy, config, "cpu")
     if (folder / CHECKPOINT_FILE).exists():
         training.load(folder / CHECKPOINT_FILE)
-    data = batches(
-        Samples(policy, config, moments),
-        config.batch,
-        first_step=training.step,
-        workers=workers,
-    )
+    samples = Samples(policy, config, moments)
+    data = batches(samples, first_step=training.step, workers=workers)
     train(training, data, folder, stop=lambda: training.step == stop_at, checks=checks)
     data.close()
     return training
@@ -102,7 +99,7 @@ def test_the_policy_that_drove_best_is_kept_and_no_check_is_made_twice(tmp_path,
         return score
 
     training = Training.begin(PROMPT_ONLY, SHORT, "cpu")
-    data = batches(Samples(PROMPT_ONLY, SHORT, moments), SHORT.batch)
+    data = batches(Samples(PROMPT_ONLY, SHORT, moments))
     at_step_4 = {}
 
     def watch(step, terms):
@@ -123,7 +120,7 @@ def test_a_check_that_was_interrupted_is_made_when_it_goes_on(tmp_path, moments)
     training = Training.begin(PROMPT_ONLY, SHORT, "cpu")
     samples = Samples(PROMPT_ONLY, SHORT, moments)
     leaves = Checks(every=4, score=lambda policy: None)
-    assert not train(training, batches(samples, SHORT.batch), tmp_path, checks=leaves)
+    assert not train(training, batches(samples), tmp_path, checks=leaves)
     again = trained(
         tmp_path,
         PROMPT_ONLY,
@@ -139,7 +136,7 @@ def test_a_loss_that_is_no_number_ends_it_and_leaves_a_whole_checkpoint(tmp_path
     config = dataclasses.replace(SHORT, learning_rate=1e25, warm_up=0)
     training = Training.begin(PROMPT_ONLY, config, "cpu")
     training.save(tmp_path / CHECKPOINT_FILE)
-    data = batches(Samples(PROMPT_ONLY, config, moments), config.batch)
+    data = batches(Samples(PROMPT_ONLY, config, moments))
     with pytest.raises(TrainingError, match=r"at step \d: try a lower --learning-rate"):
         train(training, data, tmp_path)
     fresh = Training.begin(PROMPT_ONLY, config, "cpu")
@@ -183,7 +180,7 @@ def test_a_drive_that_goes_missing_meanwhile_is_named(tmp_path, drives, workers)
     path.write_bytes(drive_paths(drives)[0].read_bytes())
     moments = load_moments([tmp_path], 0.3)
     path.unlink()
-    data = batches(Samples(PROMPT_ONLY, SHORT, moments), SHORT.batch, workers=workers)
+    data = batches(Samples(PROMPT_ONLY, SHORT, moments), workers=workers)
     with pytest.raises((TrainingError, DriveFileError), match=r"^[^\n]*00000.npz is missing"):
         next(data)
 
@@ -269,3 +266,54 @@ def test_a_policy_with_sensors_begins_with_the_planner_of_one_without(tmp_path):
 def test_weights_of_which_nothing_fits_are_refused(tmp_path):
     with pytest.raises(WeightsError, match="there is no"):
         weights_digest(tmp_path)
+
+
+def test_drives_kept_out_are_learnt_from_by_nobody_and_stay_the_same_as_more_come(moments):
+    taught, kept_out = moments.held_out(0.01)
+    assert len(taught) + len(kept_out) == len(moments)
+    assert set(kept_out.drive) == {int(moments.draws.argmin())}  # one at least
+    assert not set(taught.drive) & set(kept_out.drive)
+    _, half = moments.held_out(0.5)
+    assert set(half.drive) == set(kept_out.drive)  # of two no more than half
+    everything, nothing = moments.held_out(0.0)
+    assert (len(everything), len(nothing)) == (len(moments), 0)
+    with pytest.raises(TrainingError, match="collect more, or give --held-out 0"):
+        taught.held_out(0.1)
+
+
+def test_what_is_measured_is_the_same_each_time_and_set_aside_nowhere(moments):
+    config = dataclasses.replace(SHORT, held_out=0.1)
+    samples = Samples(PROMPT_ONLY, config, moments)
+    _, kept_out = moments.held_out(0.1)
+    assert len(samples) == 18
+    assert config.measured == 66  # whole batches of 3
+    place = kept_out.some(66)
+    drive = read_drive(moments.paths[place.drive[5]])
+    there = samples[18 + 5].targets.waypoints[0]
+    pose = drive.poses()[place.moment[5]]
+    expected, _ = expert_waypoints(drive, place.moment[5], 8, pose)
+    assert torch.equal(there, torch.from_numpy(expected))
+
+
+def test_a_log_says_how_drives_kept_out_do_where_it_was_measured(tmp_path, moments):
+    config = dataclasses.replace(SHORT, steps=30, held_out=0.1)
+    trained(tmp_path, PROMPT_ONLY, config, moments, stop_at=20)
+    trained(tmp_path, PROMPT_ONLY, config, moments)
+    first, last = read_rows(tmp_path / LOG_FILE)
+    assert HELD_OUT not in first
+    assert last[HELD_OUT] > 0.0
+    forget_rows_after(tmp_path / LOG_FILE, 20)
+    assert read_rows(tmp_path / LOG_FILE) == [first]
+    assert HELD_OUT in (tmp_path / LOG_FILE).read_text()  # the column is still there
+    assert write_curve(tmp_path / "curve.png", [first, last], [])
+
+
+def test_a_checkpoint_older_than_an_option_is_one_of_its_default(tmp_path, moments):
+    trained(tmp_path, PROMPT_ONLY, SHORT, moments, stop_at=1)
+    content = torch.load(tmp_path / CHECKPOINT_FILE, weights_only=True)
+    del content["config"]["held_out"]
+    torch.save(content, tmp_path / CHECKPOINT_FILE)
+    Training.begin(PROMPT_ONLY, SHORT, "cpu").load(tmp_path / CHECKPOINT_FILE)
+    other = dataclasses.replace(SHORT, held_out=0.1)
+    with pytest.raises(TrainingError, match=r"held_out was 0\.0, is 0\.1"):
+        Training.begin(PROMPT_ONLY, other, "cpu").load(tmp_path / CHECKPOINT_FILE)
