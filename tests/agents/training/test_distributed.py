@@ -39,7 +39,7 @@ def trained(folder, samples, team=ALONE, stop_at=None):
 
 
 def samples_of(drives, config):
-    return Samples(PROMPT_ONLY, config, load_moments(drives, standing_share=0.3))
+    return Samples(PROMPT_ONLY, config, load_moments([drives], standing_share=0.3))
 
 
 def member(rank, folder, drives):
