@@ -30,10 +30,12 @@ class Team:
     Attributes:
         rank: Which of them this is; the first (0) writes files and talks.
         size: How many there are.
+        here: How many of them are on this machine.
     """
 
     rank: int = 0
     size: int = 1
+    here: int = 1
 
     @property
     def first(self) -> bool:
@@ -130,6 +132,7 @@ def joined_team(device: str) -> Iterator[tuple[Team, str]]:
         torch.cuda.set_device(device)
     dist.init_process_group("nccl" if device != "cpu" else "gloo", timeout=PATIENCE)
     try:
-        yield Team(rank=dist.get_rank(), size=size), device
+        here = int(os.environ["LOCAL_WORLD_SIZE"])
+        yield Team(rank=dist.get_rank(), size=size, here=here), device
     finally:
         dist.destroy_process_group()

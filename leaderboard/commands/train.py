@@ -179,7 +179,7 @@ class Train:
         samples = Samples(policy, config, moments)
         with compile_progress(Console(stderr=True)):
             samples[0]  # before several processes need the same kernels
-        workers = _free_cores() if self.workers is None else self.workers
+        workers = _free_cores(team) if self.workers is None else self.workers
         data = batches(samples, first_step=training.step, workers=workers, team=team)
         show = TrainingDisplay(done=training.step, steps=config.steps, batch=config.batch)
         with (
@@ -275,10 +275,9 @@ def _one_talks(team: Team) -> Iterator[None]:
         yield
 
 
-def _free_cores() -> int:
-    """Those that are left when each process of this machine's team has one; at least one each."""
-    together = int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
-    return max((os.cpu_count() or 2) // together - 1, 1)
+def _free_cores(team: Team) -> int:
+    """Each process's part of the cores that are left when each has one; one at least."""
+    return max((os.cpu_count() or 2) // team.here - 1, 1)
 
 
 def _parts(names: Sequence[str]) -> str:

@@ -46,9 +46,9 @@ def member(rank, folder, drives):
     """One of two processes: trains in one go, and again in two halves."""
     torch.set_num_threads(1)
     os.environ |= {"RANK": str(rank), "WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1"}
-    os.environ |= {"MASTER_PORT": (folder / "port").read_text()}
+    os.environ |= {"MASTER_PORT": (folder / "port").read_text(), "LOCAL_WORLD_SIZE": "2"}
     with joined_team("cpu") as (team, device):
-        assert (team, device) == (Team(rank=rank, size=2), "cpu")
+        assert (team, device) == (Team(rank=rank, size=2, here=2), "cpu")
         samples = samples_of(drives, TWO)
         losses, whole = trained(folder / "whole", samples, team)
         trained(folder / "halves", samples, team, stop_at=3)
