@@ -84,6 +84,7 @@ class Explanation:
         film: What was to be seen, every tenth of a second.
         times_s: (N,) game time.
         decisions: (N,) how many decisions came before.
+        poses: (N, 3) x, y [m], yaw [rad] of the ego, world frame.
         controls: (N, 3) throttle, steer, brake.
         seen: Component of the prompt to (N, ...) what the agent was told, in the form of the
             observation, and `prompt_present`; empty for an agent without a prompt.
@@ -106,6 +107,7 @@ class Explanation:
     film: Film
     times_s: NDArray[np.float64]
     decisions: NDArray[np.int64]
+    poses: NDArray[np.float64]
     controls: NDArray[np.float32]
     seen: Mapping[str, NDArray[Any]]
     images: tuple[bytes, ...]

@@ -27,6 +27,7 @@ from leaderboard.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.replay import ReplayStep
 from leaderboard.retracing import Decision, Eyes, retrace
 from leaderboard.rules import rules_named
+from leaderboard.timed_edits import EditPlan, timed_edits
 from leaderboard.what_if import Question
 from wrappers.interventions.context import context_of
 
@@ -165,6 +166,8 @@ class _Going:
     def __init__(self, env: RouteEnv, moment: Moment, driver: Driver) -> None:
         self._env, self._moment = env, moment
         self._agent, self._memory, self._eyes = driver.agent, driver.memory, driver.eyes
+        plan = timed_edits(moment.record.interventions)
+        self._later = EditPlan(plan, env.config.control_dt_s)
         self._every = film_every(env.config.control_dt_s)
         self._film = Film()
         self._controls: list[Control] = []
@@ -193,6 +196,8 @@ class _Going:
         observation, _, terminated, truncated, self._info = self._env.step(control)
         self._over = terminated or truncated
         self.number += 1
+        if self._later.apply(self._env, self.number):  # what was done to the recorded world too
+            observation = self._env.observe()
         self._controls.append(control)
         self._events += [event_record(event, self._env.view) for event in self._info["events"]]
         self._seen = self._look(observation, control)

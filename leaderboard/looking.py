@@ -14,6 +14,7 @@ from agents.base import Agent, Observation
 from di_envs.prompt import COMPONENTS
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera_config import CameraConfig, rig_of
+from di_envs.world.world import WorldView
 from leaderboard.explanation import ActivationMaps, Explanation, WhatIf
 from leaderboard.pages.film import Film, film_every
 from leaderboard.record import RouteRecord, RunRecord
@@ -46,6 +47,7 @@ class Looking:
         self._film = Film()
         self._numbers: list[int] = []
         self._times_s: list[float] = []
+        self._poses: list[tuple[float, float, float]] = []
         self._controls: list[NDArray[np.float32]] = []
         self._images: list[bytes] = []
         self._looks: list[Look] = []
@@ -63,6 +65,7 @@ class Looking:
             return
         self._numbers.append(decision.number)
         self._times_s.append(decision.time_s)
+        self._poses.append(_pose(step.view))
         self._controls.append(decision.control)
         self._images += _front_image(decision)
         for name in (*COMPONENTS, PRESENT):
@@ -90,6 +93,7 @@ class Looking:
             film=self._film,
             times_s=np.array(self._times_s),
             decisions=np.array(self._numbers),
+            poses=np.array(self._poses).reshape(-1, 3),
             controls=np.array(self._controls, np.float32).reshape(-1, 3),
             seen={name: np.stack(rows) for name, rows in self._seen.items()},
             images=tuple(self._images),
@@ -159,6 +163,11 @@ def _front_image(decision: Decision) -> list[bytes]:
     written = io.BytesIO()
     Image.fromarray(np.asarray(image)).save(written, "JPEG", quality=JPEG_QUALITY)
     return [written.getvalue()]
+
+
+def _pose(view: WorldView) -> tuple[float, float, float]:
+    state, ego = view.state, view.ego
+    return float(state.x[ego]), float(state.y[ego]), float(state.yaw[ego])
 
 
 def _front_camera(env: RouteEnv) -> CameraConfig:

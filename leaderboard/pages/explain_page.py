@@ -22,14 +22,14 @@ from di_envs.world.state import TICK_S
 from leaderboard.explanation import Answer, Explanation, WhatIf
 from leaderboard.footing import footing_differences, footing_here, footing_of
 from leaderboard.pages.blocks import Column, write_block
-from leaderboard.pages.explain_tables import answers_table
-from leaderboard.pages.film import Film
+from leaderboard.pages.explain_tables import answers_table, telling_events
 from leaderboard.pages.looks import look_columns, map_columns
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
 from leaderboard.pages.report_page import event_heads, film_meta, player_parts
-from leaderboard.pages.report_tables import facts_table
+from leaderboard.pages.report_tables import event_text, facts_table
 from leaderboard.pages.told import told_columns
 from leaderboard.pages.town_svg import town_svg
+from leaderboard.record import RunRecord
 from leaderboard.retracing import FRONT
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-explanation", 1
@@ -57,7 +57,7 @@ def explain_page(explanation: Explanation) -> str:
         notes=joined(element("p", note, class_="note") for note in _notes(explanation)),
         **player_parts(),
         town=town_svg(explanation.town),
-        answers=answers_table(explanation.what_if) if explanation.what_if else "",
+        answers=answers_table(explanation.what_if, run) if explanation.what_if else "",
         facts=facts_table(run),
         head=json_script("explanation", _head(explanation, blocks)),
         blocks=joined(
@@ -97,24 +97,27 @@ def _blocks(explanation: Explanation) -> Iterator[tuple[str, str]]:
     yield "film", write_block(film_meta(film, record), film.columns())
     yield "looks", write_block({}, look_columns(explanation))
     if _is_told(explanation.seen):
-        poses = poses_at(film, explanation.times_s)
-        yield "told", write_block({}, told_columns(explanation.seen, poses))
+        yield "told", write_block({}, told_columns(explanation.seen, explanation.poses))
     if explanation.images:
         sizes = {"bytes": Column(values=[len(image) for image in explanation.images])}
         yield "image-sizes", write_block({}, sizes)
         yield "images", base64.b64encode(b"".join(explanation.images)).decode("ascii")
     for name, maps in _shown_maps(explanation).items():
         yield f"map-{name}", write_block({}, map_columns(maps))
-    for number, answer in enumerate(_all_answers(explanation.what_if)):
+    if explanation.what_if is not None:
+        yield from _future_blocks(explanation, explanation.what_if)
+
+
+def _future_blocks(explanation: Explanation, what_if: WhatIf) -> Iterator[tuple[str, str]]:
+    """Each future's film, and what the agent was told when it began."""
+    pose = explanation.poses[what_if.moment][None]
+    for number, answer in enumerate(_all_answers(what_if)):
         future = answer.future
-        yield (
-            f"future-{number}",
-            write_block(film_meta(future.film, record), future.film.columns()),
-        )
+        meta = film_meta(future.film, explanation.record)
+        yield f"future-{number}", write_block(meta, future.film.columns())
         if _is_told(future.seen):
             told = {name: np.asarray(future.seen[name])[None] for name in _PROMPT}
-            poses = poses_at(future.film, np.array([explanation.what_if.at_s]))  # type: ignore[union-attr]
-            yield f"told-{number}", write_block({}, told_columns(told, poses))
+            yield f"told-{number}", write_block({}, told_columns(told, pose))
 
 
 _PROMPT = (*COMPONENTS, "prompt_present")
@@ -136,22 +139,6 @@ def _shown_maps(explanation: Explanation) -> dict[str, Any]:
 
 def _all_answers(what_if: WhatIf | None) -> tuple[Answer, ...]:
     return (what_if.base, *what_if.answers) if what_if else ()
-
-
-def poses_at(film: Film, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) x, y, yaw of the ego at the film's moments of these times.
-
-    Raises:
-        ValueError: If the film has no moment at one of them.
-    """
-    columns = film.columns()
-    ticks = np.asarray(columns["tick"].values)
-    wanted = np.rint(times_s / TICK_S)
-    place = np.searchsorted(ticks, wanted).clip(max=len(ticks) - 1)
-    if not np.array_equal(ticks[place], wanted):
-        raise ValueError("the film has no moment at a time that was looked at")
-    names = ("ego_x", "ego_y", "ego_yaw")
-    return np.stack([np.asarray(columns[name].values)[place] for name in names], axis=1)
 
 
 def _head(explanation: Explanation, blocks: Mapping[str, str]) -> dict[str, Any]:
@@ -184,7 +171,7 @@ def _head(explanation: Explanation, blocks: Mapping[str, str]) -> dict[str, Any]
             }
             for name, maps in _shown_maps(explanation).items()
         ],
-        "what_if": _what_if_head(explanation.what_if),
+        "what_if": _what_if_head(explanation.what_if, explanation.run),
     }
 
 
@@ -197,17 +184,17 @@ def _command(number: int) -> str:
     return RoadOption(number).name.lower() if number else "none"
 
 
-def _what_if_head(what_if: WhatIf | None) -> dict[str, Any] | None:
+def _what_if_head(what_if: WhatIf | None, run: RunRecord) -> dict[str, Any] | None:
     if what_if is None:
         return None
     return {
         "at_s": what_if.at_s,
         "end_s": max(answer.future.end_s for answer in _all_answers(what_if)),
-        "answers": [_answer_head(answer) for answer in _all_answers(what_if)],
+        "answers": [_answer_head(answer, run) for answer in _all_answers(what_if)],
     }
 
 
-def _answer_head(answer: Answer) -> dict[str, Any]:
+def _answer_head(answer: Answer, run: RunRecord) -> dict[str, Any]:
     future = answer.future
     points = () if answer.look is None else tuple(answer.look.response.waypoints)
     return {
@@ -217,6 +204,10 @@ def _answer_head(answer: Answer) -> dict[str, Any]:
         "end_s": future.end_s,
         "status": future.status,
         "problem": future.problem,
+        "events": [
+            {"time_s": event.time_s, "text": event_text(event)}
+            for event in telling_events(future, run)
+        ],
     }
 
 

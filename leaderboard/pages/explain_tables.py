@@ -10,6 +10,8 @@ from leaderboard.explanation import Answer, WhatIf
 from leaderboard.futures import Future
 from leaderboard.pages.markup import Cell, Heading, Markup, TableOf
 from leaderboard.pages.report_tables import event_text
+from leaderboard.record import EventRecord, RunRecord
+from leaderboard.rules import rules_named
 
 _HEADINGS = (
     Heading(name="edit"),
@@ -29,9 +31,9 @@ _HEADINGS = (
 _NONE = "\N{EN DASH}"
 
 
-def answers_table(what_if: WhatIf) -> Markup:
+def answers_table(what_if: WhatIf, run: RunRecord) -> Markup:
     """A row for the drive as it was, and one for each edit."""
-    rows = [_row(answer, what_if.base) for answer in (what_if.base, *what_if.answers)]
+    rows = [_row(answer, what_if.base, run) for answer in (what_if.base, *what_if.answers)]
     return TableOf(id="answers", headings=_HEADINGS, rows=rows).markup()
 
 
@@ -43,7 +45,7 @@ def path_moves_m(answer: Answer, base: Answer) -> float:
     return float(np.linalg.norm(apart, axis=1).max(initial=0.0))
 
 
-def _row(answer: Answer, base: Answer) -> tuple[Cell, ...]:
+def _row(answer: Answer, base: Answer, run: RunRecord) -> tuple[Cell, ...]:
     future = answer.future
     control = [math.nan] * 3 if answer.control is None else answer.control.tolist()
     return (
@@ -53,7 +55,7 @@ def _row(answer: Answer, base: Answer) -> tuple[Cell, ...]:
         _last_waypoint(answer),
         _number(future.driving_score, ".1f"),
         _number(future.route_completion, ".1f", " %"),
-        Cell(shows=_what_happened(future)),
+        Cell(shows=_what_happened(future, run)),
     )
 
 
@@ -70,8 +72,17 @@ def _last_waypoint(answer: Answer) -> Cell:
     return Cell(shows=f"{x:.1f} m, {y:+.1f} m", sort=x)
 
 
-def _what_happened(future: Future) -> str:
-    events = [f"{event_text(event)} at {event.time_s:.1f} s" for event in future.events]
+def telling_events(future: Future, run: RunRecord) -> list[EventRecord]:
+    """The events that count in the score, or end the route."""
+    rules = rules_named(run.rules)
+    kinds = {*rules.infractions, *rules.endings}
+    return [event for event in future.events if event.kind in kinds]
+
+
+def _what_happened(future: Future, run: RunRecord) -> str:
+    events = [
+        f"{event_text(event)} at {event.time_s:.1f} s" for event in telling_events(future, run)
+    ]
     ends = future.status or f"driven to {future.end_s:.1f} s"
     if future.problem:
         ends = f"{ends}: {future.problem}"

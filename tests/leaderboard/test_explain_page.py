@@ -20,7 +20,6 @@ from agents.driveinsight.weights import save_pretrained
 from leaderboard.cli import main
 from leaderboard.explaining import explain_route
 from leaderboard.pages.blocks import read_block
-from leaderboard.pages.explain_page import poses_at
 from leaderboard.pages.looks import GREYS, gradient_step
 from leaderboard.results import write_run
 
@@ -123,10 +122,9 @@ def test_what_the_page_says_was_told_is_what_was_told(explained, page):
 
 def test_the_pages_map_is_the_told_one_in_the_worlds_frame(explained, page):
     told = block_of(page, "told")
-    poses = poses_at(explained.film, explained.times_s)
     starts = np.cumsum([0, *told["line_count"]]).astype(int)
     place = 0
-    for i, (x, y, yaw) in enumerate(poses):
+    for i, (x, y, yaw) in enumerate(explained.poses):
         for row in explained.seen["map"][i]:
             row = row[row[:, 3] > 0]
             if not len(row):

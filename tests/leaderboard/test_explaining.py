@@ -14,6 +14,8 @@ from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.look import look_at
 from di_envs.edit_text import EditError
+from di_envs.world_edits import read_world_edits
+from leaderboard.branch import branch, branch_run
 from leaderboard.explaining import explain_route
 from leaderboard.explanation import ExplainError
 from leaderboard.pages.explain_tables import path_moves_m
@@ -89,6 +91,8 @@ def test_each_moments_arrays_are_what_a_look_at_it_shows(run, explained):
         for name, maps in explained.maps.items():
             assert np.array_equal(maps.values[i], look.maps[name])
         assert np.array_equal(explained.controls[i], decision.control)
+        state = decision.step.view.state
+        assert explained.poses[i].tolist() == [state.x[0], state.y[0], state.yaw[0]]
         for name, told in explained.seen.items():
             assert np.array_equal(told[i], decision.seen[name])
     assert explained.missing == ()
@@ -169,6 +173,18 @@ def test_what_an_edit_remembers_is_from_before_the_moment(run):
     (answer,) = explained.what_if.answers
     assert answer.future.seen["speed"] == explained.seen["speed"][3]
     assert explained.seen["speed"][3] != explained.seen["speed"][8]
+
+
+def test_a_world_that_was_edited_later_is_edited_in_the_futures_too():
+    run = short_run("constant", DECISIONS, **BUSY)
+    edits = read_world_edits("; ".join(f"remove:actor={i}" for i in range(1, 6)))
+    edited = branch_run(run, branch(run, run.routes[0], 1.0, edits))
+    asked = {"at_s": 0.8, "what_if": "identity:all", "ahead_s": 0.5}
+    explained = explain_route(edited, edited.routes[0].route_id, **asked)
+    (same,) = explained.what_if.answers
+    checks = edited.routes[0].check_array()[8:14]
+    assert np.array_equal(same.future.checks, checks)
+    assert not np.array_equal(checks[2:], run.routes[0].check_array()[10:14])
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@
 
     // Points on the ground ahead, where the camera sees them
     function path(points, scale, look) {
-      const seen = [[camera.x_m + 2, 0], ...points].map(project).filter((point) => point !== null);
+      const seen = points.map(project).filter((point) => point !== null);
       if (seen.length < 2) return;
       context.setTransform(scale, 0, 0, scale, 0, 0);
       context.lineJoin = context.lineCap = "round";
@@ -53,7 +53,7 @@
         context.stroke();
       }
       context.fillStyle = look.path;
-      for (const [column, row] of seen.slice(1)) {
+      for (const [column, row] of seen) {
         context.beginPath();
         context.arc(column, row, (2.2 * camera.width) / 256, 0, 2 * Math.PI);
         context.fill();
@@ -66,7 +66,7 @@
       const [forth, side] = [cos * x + sin * y, cos * y - sin * x];
       const [level, tilt] = [Math.cos(camera.pitch_rad), Math.sin(camera.pitch_rad)];
       const [depth, up] = [level * forth + tilt * z, level * z - tilt * forth];
-      if (depth < 0.5) return null;
+      if (depth < 1) return null;
       const focal = camera.width / 2 / Math.tan((camera.fov_deg * Math.PI) / 360);
       return [camera.width / 2 + (focal * side) / depth, camera.height / 2 - (focal * up) / depth];
     }

@@ -53,11 +53,13 @@
     function tell(answer, caption, now, film) {
       const over = time_s > film.end_s + 0.01;
       const [throttle, steer, brake] = answer.control ?? [];
-      const first = answer.control === null ? "fails" : `throttle ${throttle.toFixed(2)}, steer ${steer.toFixed(2)}, brake ${brake.toFixed(2)}`;
+      const first = answer.control === null ? "the agent fails" : `throttle ${throttle.toFixed(2)} · steer ${steer.toFixed(2)} · brake ${brake.toFixed(2)}`;
+      const last = answer.events.filter((event) => event.time_s <= time_s + 0.01).at(-1);
       const ends = over ? `over at ${film.end_s.toFixed(1)} s${answer.status ? `: ${answer.status}` : ""}` : `${(3.6 * now.ego.speed).toFixed(1)} km/h`;
-      caption.innerHTML = "<span></span><br><b></b>";
-      caption.children[0].textContent = `decides: ${first}`;
+      caption.innerHTML = "<span></span><br><b></b><br><span></span>";
+      caption.children[0].textContent = first;
       caption.children[2].textContent = `${ends}, score ${now.score.toFixed(1)}`;
+      caption.children[4].textContent = last ? `${last.time_s.toFixed(1)} s: ${last.text}` : "";
     }
 
     function frame(now_ms) {

@@ -8,6 +8,7 @@
 (function (di) {
   const SIDE = 8; // the scrub bar's ends lie that much within it
   const HEIGHT = 34;
+  const NEARLY = 0.99; // share of all values that are drawn whole
 
   function on(element, { head, looks, end_s, events, marks, on_time }) {
     const { groups } = head;
@@ -43,26 +44,23 @@
       };
     }
 
-    const largest = groups.map((_, g) => peak((i) => Math.max(...looks.gradient(i, g))));
     const share = (i, g) => {
       let sum = 0;
       for (let one = 0; one < head.heads; one++) sum += looks.attention(i, layer, one, g);
       return sum / Math.max(head.heads, 1);
     };
 
-    function peak(value) {
-      let most = 0;
-      for (let i = 0; i < looks.count; i++) most = Math.max(most, value(i));
-      return most;
-    }
-
-    function scale(g) {
-      const each = mode === "gradient" ? largest : groups.map((_, one) => peak((i) => share(i, one)));
-      return (own ? each[g] : Math.max(...each)) || 1;
+    // What a row's height stands for: nearly the largest value, as single peaks would flatten the rest
+    function scales() {
+      const value = mode === "gradient" ? (i, g) => Math.max(...looks.gradient(i, g)) : share;
+      const each = groups.map((_, g) => Array.from({ length: looks.count }, (_, i) => value(i, g)));
+      if (own) return each.map(nearly_largest);
+      return each.fill(nearly_largest(each.flat()));
     }
 
     function paint() {
       const style = getComputedStyle(element);
+      const most_of = scales();
       const colour = (name) => style.getPropertyValue(`--${name}`).trim();
       rows.forEach(({ strip }, g) => {
         const ratio = globalThis.devicePixelRatio || 1;
@@ -77,7 +75,7 @@
           context.fillRect(x(time_s) - 0.75, 0, 1.5, HEIGHT);
         }
         context.globalAlpha = 1;
-        const most = scale(g);
+        const most = most_of[g];
         const middle = mode === "gradient" ? HEIGHT / 2 : HEIGHT - 2;
         const reach = mode === "gradient" ? HEIGHT / 2 - 2 : HEIGHT - 4;
         context.fillStyle = colour("rule");
@@ -86,7 +84,7 @@
           context.beginPath();
           context.moveTo(x(looks.times[0]), middle);
           for (let i = 0; i < looks.count; i++) {
-            const y = middle - (up * reach * value(i)) / most;
+            const y = middle - up * reach * Math.min(1, value(i) / most);
             context.lineTo(x(looks.times[i]), y);
             context.lineTo(x(looks.times[i + 1] ?? end_s), y);
           }
@@ -109,7 +107,7 @@
       const i = looks.place(time_s);
       const first = rows[0].strip;
       cursor.style.left = `${first.offsetLeft + SIDE + ((first.clientWidth - 2 * SIDE) * time_s) / end_s}px`;
-      const most = Math.max(...largest) || 1;
+      const most = Math.max(...groups.flatMap((_, g) => looks.gradient(i, g))) || 1;
       rows.forEach(({ bars, numbers, heads }, g) => {
         looks.gradient(i, g).forEach((value, c) => {
           bars[c].style.width = `${(100 * value) / most}%`;
@@ -143,6 +141,11 @@
         rows.forEach(({ name }, g) => name.classList.toggle("dropped", names.includes(groups[g])));
       },
     };
+  }
+
+  function nearly_largest(values) {
+    const sorted = values.toSorted((one, other) => one - other);
+    return sorted[Math.floor(NEARLY * (sorted.length - 1))] || sorted[sorted.length - 1] || 1;
   }
 
   function short(value) {

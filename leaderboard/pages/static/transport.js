@@ -73,6 +73,7 @@
       const { tagName: name, type } = event.target;
       const own = ["SELECT", "BUTTON", "A", "SUMMARY"].includes(name) || (name === "INPUT" && type !== "range");
       if (event.ctrlKey || event.altKey || event.metaKey || (own && event.key === " ")) return;
+      if (type === "range" && event.target.id !== "scrub") return; // another bar's own keys
       if (name === "SELECT" || !(event.key in KEYS) || end_s === 0) return;
       event.preventDefault();
       KEYS[event.key](event);
