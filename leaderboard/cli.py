@@ -42,6 +42,7 @@ First steps:
   driveinsight evaluate --agent expert --suite town05_tiny
   driveinsight show results/expert-town05_tiny            the table again
   driveinsight report results/expert-town05_tiny          a page with a replay of each route
+  driveinsight explain results/expert-town05_tiny --route 0   why it drove one so, and what if
   driveinsight verify results/expert-town05_tiny          does the claim stand?
   driveinsight drive --agent expert --suite town05_tiny --video out.mp4
   driveinsight collect                                    data to train a policy of your own"""
