@@ -22,6 +22,7 @@ from leaderboard.commands.branch import BRANCH_HELP, Branch
 from leaderboard.commands.collect import COLLECT_HELP, Collect
 from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
+from leaderboard.commands.edit import EDIT_HELP, Edit
 from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.explain import EXPLAIN_HELP, Explain
@@ -59,6 +60,7 @@ Command = (
     | Annotated[Ablate, tyro.conf.subcommand("ablate", description=ABLATE_HELP)]
     | Annotated[Respond, tyro.conf.subcommand("respond", description=RESPOND_HELP)]
     | Annotated[Explain, tyro.conf.subcommand("explain", description=EXPLAIN_HELP)]
+    | Annotated[Edit, tyro.conf.subcommand("edit", description=EDIT_HELP)]
     | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
     | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]

@@ -20,7 +20,8 @@ from leaderboard.studies.table_two import BASELINE as PAPER_BASELINE
 from leaderboard.studies.table_two import TABLE_2
 
 # Heading, and whether its cells stand at the left
-_EFFECTS = ("row", "DS", "change", "interval", "verdict", "could see", "paper")
+_EFFECTS = ("row", "DS", "change", "interval", "verdict", "could see")
+_PAPER = "paper"
 _DETAILS = ("row", "RC", "IS", "infractions per km", "same drives", "driven in")
 _LEFT = ("row", "verdict", "infractions per km")
 _SHOWN_KINDS = 3  # infractions that fit beside a row
@@ -29,7 +30,7 @@ Cells = list[tuple[str, ...]]
 
 
 def effect_cells(ablation: Ablation) -> Cells:
-    """What each row does to the driving score, in the order of `_EFFECTS`."""
+    """What each row does to the driving score, in the order of `effect_columns`."""
     study, null = ablation.study, ablation.study.row(NULL)
     paper = f"{PAPER_BASELINE.driving_score:.1f} DS"
     cells: Cells = [(BASELINE, _mean_text(study.baseline, "driving_score", 1), *[""] * 4, paper)]
@@ -49,7 +50,16 @@ def effect_cells(ablation: Ablation) -> Cells:
                 "-" if there is None else f"{there:+.1f}",
             )
         )
-    return cells
+    return [row[: len(effect_columns(ablation))] for row in cells]
+
+
+def effect_columns(ablation: Ablation) -> tuple[str, ...]:
+    """The headings; the paper's only where it has a figure for a row."""
+    return (*_EFFECTS, _PAPER) if _has_paper(ablation) else _EFFECTS
+
+
+def _has_paper(ablation: Ablation) -> bool:
+    return any(row.paper_difference is not None for row in ablation.rows)
 
 
 def detail_cells(ablation: Ablation) -> Cells:
@@ -118,7 +128,7 @@ def title(ablation: Ablation) -> str:
     seeds = len(study.seeds)
     shared = f" with {'; '.join(study.interventions)}" if study.interventions else ""
     return (
-        f"Ablation of {study.agent}{shared} on {study.suite}, {seeds} "
+        f"{study.kind.capitalize()} of {study.agent}{shared} on {study.suite}, {seeds} "
         f"seed{'s' if seeds > 1 else ''}, rules {study.rules}"
     )
 
@@ -133,9 +143,12 @@ def notes(ablation: Ablation) -> list[str]:
         f"matters: the interval excludes 0. equivalent: two one-sided tests say within "
         f"±{MARGIN_DS:g} DS. could see: the effect that would have been found with "
         f"{100 * POWER:.0f} % probability ('-': nothing varied).",
-        "paper: difference of DS in Table 2 of Li et al., 2024; its model had Town05 in training, "
-        "its rows have no interval.",
     ]
+    if _has_paper(ablation):
+        lines.append(
+            "paper: difference of DS in Table 2 of Li et al., 2024; its model had Town05 in "
+            "training, ours had not; its rows have no interval."
+        )
     baseline = mean_of(study.baseline, "driving_score")
     if baseline is not None and baseline < _LOW_DS:
         lines.append(
@@ -179,7 +192,7 @@ def _missing(study: Study) -> list[str]:
 def ablation_tables(ablation: Ablation) -> Group:
     """For the terminal."""
     plain = 1 + bool(ablation.study.row(NULL).drives)
-    effects = _table(title(ablation), _EFFECTS, effect_cells(ablation), plain)
+    effects = _table(title(ablation), effect_columns(ablation), effect_cells(ablation), plain)
     details = _table("what else changes", _DETAILS, detail_cells(ablation), plain)
     said = [Text(line) for line in sentences(ablation)]
     return Group(effects, details, *said, Text("\n".join(notes(ablation)), style="dim"))
@@ -211,11 +224,29 @@ def ablation_markdown(ablation: Ablation, picture: str = "") -> str:
     lines = [f"# {title(ablation)}", ""]
     if picture:
         lines += [f"![Differences of driving score with their intervals]({picture})", ""]
-    lines += markdown_table(_EFFECTS, effect_cells(ablation))
+    return "\n".join([*lines, *table_lines(ablation)])
+
+
+def table_lines(ablation: Ablation) -> list[str]:
+    """The tables of a study's rows and its notes, in Markdown."""
+    lines = ["## Driving score", ""]
+    lines += markdown_table(effect_columns(ablation), effect_cells(ablation))
     lines += ["", "## What else changes", ""]
     lines += markdown_table(_DETAILS, detail_cells(ablation))
-    lines += ["", "## Beside the paper", ""]
-    beside = [
+    if _has_paper(ablation):
+        lines += ["", "## Beside the paper", "", *_beside_paper(ablation)]
+    lines += ["", "## Infractions per km, less the baseline's", ""]
+    kinds = sorted({name for row in ablation.rows for name in row.per_km})
+    cells = [
+        (row.driven.row.edit, *(f"{row.per_km.get(kind, 0.0):+.2f}" for kind in kinds))
+        for row in ablation.rows
+    ]
+    lines += markdown_table(("row", *map(_kind, kinds)), cells)
+    return [*lines, "", "## Notes", "", *(f"- {line}" for line in notes(ablation)), ""]
+
+
+def _beside_paper(ablation: Ablation) -> list[str]:
+    cells = [
         (
             row.driven.row.edit,
             f"{row.difference.mean + 0.0:+.1f}",
@@ -226,17 +257,8 @@ def ablation_markdown(ablation: Ablation, picture: str = "") -> str:
         for row in ablation.rows
         if row.driven.row.component in TABLE_2
     ]
-    lines += markdown_table(("row", "here", "verdict", "there", "verdict there"), beside)
-    lines += ["", *(f"- {line}" for line in sentences(ablation))]
-    lines += ["", "## Infractions per km, less the baseline's", ""]
-    kinds = sorted({name for row in ablation.rows for name in row.per_km})
-    cells = [
-        (row.driven.row.edit, *(f"{row.per_km.get(kind, 0.0):+.2f}" for kind in kinds))
-        for row in ablation.rows
-    ]
-    lines += markdown_table(("row", *map(_kind, kinds)), cells)
-    lines += ["", "## Notes", "", *(f"- {line}" for line in notes(ablation)), ""]
-    return "\n".join(lines)
+    table = markdown_table(("row", "here", "verdict", "there", "verdict there"), cells)
+    return [*table, "", *(f"- {line}" for line in sentences(ablation))]
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

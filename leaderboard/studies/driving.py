@@ -199,7 +199,7 @@ class _Driving:
         for row in plan.rows:
             self._rows[row.name] = DrivenRow(row=row, left_out=reasons[row.name])
         self._extra = dict(earlier.extra) if earlier else {}
-        if all(self._rows[row.name].left_out for row in plan.rows):
+        if plan.rows and all(self._rows[row.name].left_out for row in plan.rows):
             why = "; ".join(dict.fromkeys(reasons.values()))
             raise StudyError(
                 f"there is nothing to study with agent '{plan.spec.agent}': no row can be driven "

@@ -11,7 +11,7 @@ from rich.console import Console
 from leaderboard.studies.ablation import findings, sentences, work_out
 from leaderboard.studies.ablation_table import ablation_markdown, ablation_tables
 from leaderboard.studies.effects import EQUIVALENT, MATTERS
-from leaderboard.studies.results import keep_ablation, write_ablation
+from leaderboard.studies.results import keep_study, write_ablation
 from leaderboard.studies.rows import ABLATION_ROWS, choose_rows
 from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, read_study
@@ -95,7 +95,7 @@ def test_the_order_of_rows_is_compared_with_the_papers():
 
 
 def test_the_record_comes_back_whole_and_gives_the_same_again(made, tmp_path):
-    keep_ablation(tmp_path, made)
+    keep_study(tmp_path, made)
     again = read_study(tmp_path)
     assert again == made
     assert findings(work_out(again)) == findings(work_out(made))
@@ -148,7 +148,7 @@ def test_rows_are_chosen_by_row_by_text_or_by_component():
     ],
 )
 def test_a_broken_record_is_refused_with_what_to_do(made, tmp_path, damage, message):
-    keep_ablation(tmp_path, made)
+    keep_study(tmp_path, made)
     path = tmp_path / STUDY_FILE
     path.write_text(damage(path.read_text()))
     with pytest.raises(StudyError, match=message):

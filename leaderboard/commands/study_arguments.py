@@ -1,0 +1,121 @@
+"""What the commands that drive studies share: their arguments, and how a study is driven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, complain, say
+from leaderboard.commands.engine_arguments import EngineArguments
+from leaderboard.commands.evaluate import plain_name
+from leaderboard.commands.scene_arguments import SceneArguments, says
+
+if TYPE_CHECKING:
+    from leaderboard.studies.record import Study
+    from leaderboard.studies.rows import Row
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyArguments(EngineArguments, SceneArguments):
+    """Whom to study, where, and how much; `kind` and `rows` are the command's."""
+
+    agent: Annotated[str, says("AGENT", "none; not needed with --show")] = ""
+    """A name or a scheme (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
+
+    seeds: Annotated[int, says("N", "1")] = 1
+    """How many seeds to drive every route with: 3 means 0, 1 and 2."""
+
+    route_ids: Annotated[tuple[str, ...], says("ID ...", "all")] = ()
+    """Drive these routes only."""
+
+    output: Annotated[Path | None, says("STUDY", "results/KIND-AGENT-SUITE")] = None
+    """Folder of the study; what it holds already is kept."""
+
+    show: Annotated[Path | None, says("STUDY", "none")] = None
+    """Drive nothing: show the study in this folder, and draw its table and figures anew."""
+
+    def run(self) -> int:
+        """Drives the study, or shows one; returns the exit code."""
+        from leaderboard.jobs import SetupError
+        from leaderboard.results import ResultsError
+        from leaderboard.studies.study_error import StudyError
+
+        try:
+            return self._drive() if self.show is None else self._show(self.show)
+        except (StudyError, SetupError, ResultsError) as error:
+            raise UsageError(str(error)) from error
+
+    def kind(self) -> str:
+        """Of study."""
+        raise NotImplementedError
+
+    def chosen_rows(self) -> Sequence[Row]:
+        """What is to be driven beside the baseline and the null row."""
+        raise NotImplementedError
+
+    def measured(self, study: Study, folder: Path) -> Study:
+        """The study with what is measured once all is driven."""
+        return study
+
+    def print_study(self, study: Study, folder: Path) -> list[str]:
+        """Draws and prints a study; returns lines that name the next step."""
+        raise NotImplementedError
+
+    def _show(self, path: Path) -> int:
+        from leaderboard.studies.study_error import StudyError
+        from leaderboard.studies.study_file import read_study
+
+        study = read_study(path)
+        if study.kind != self.kind():
+            raise StudyError(
+                f"{path} is a study of another kind, {study.kind}: show it with the command that "
+                "made it"
+            )
+        self._print(study, path if path.is_dir() else path.parent)
+        return 0
+
+    def _drive(self) -> int:
+        if not self.agent:
+            raise UsageError("say whom to study: --agent driveinsight (`driveinsight agents`)")
+        if self.seeds < 1:
+            raise UsageError("--seeds must be at least 1")
+        self.check_engine()
+        rows = tuple(self.chosen_rows())
+        options, suite = self.choose(self.route_ids)
+        name = f"{self.kind()}-{plain_name(self.agent)}-{plain_name(suite.name)}"
+        folder = self.output or Path("results") / name.replace(" ", "-")
+
+        from leaderboard.jobs import RunSpec
+        from leaderboard.studies.driving import StudyPlan, drive_study
+        from leaderboard.studies.results import keep_study
+
+        spec = RunSpec(
+            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+        )
+        study, interrupted = drive_study(
+            StudyPlan(kind=self.kind(), spec=spec, suite=suite, rows=rows),
+            self.seeds,
+            folder=folder,
+            engine=self.make_engine(),
+            keep=lambda so_far: keep_study(folder, so_far),
+        )
+        if not interrupted:
+            try:
+                study = self.measured(study, folder)
+            except KeyboardInterrupt:
+                interrupted = True
+            keep_study(folder, study)
+        self._print(study, folder)
+        if interrupted:
+            complain("the same command goes on from here", "[yellow]interrupted[/yellow]")
+            return EXIT_INTERRUPTED
+        return 0 if study.complete else EXIT_CRASHED
+
+    def _print(self, study: Study, folder: Path) -> None:
+        next_steps = self.print_study(study, folder)
+        if study.complete:
+            say(*next_steps)
+        else:
+            say("Next: the same command drives what is missing")
