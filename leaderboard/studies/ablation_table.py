@@ -45,7 +45,7 @@ def effect_cells(ablation: Ablation) -> Cells:
                 f"{row.driving_score:.1f}",
                 f"{found.mean + 0.0:+.1f}",
                 "-" if found.low is None else f"{found.low:+.1f} … {found.high or 0.0:+.1f}",
-                f"{row.verdict}, not 0" if _small_but_clear(row) else row.verdict,
+                _verdict_text(row),
                 "-" if found.smallest is None else f"{found.smallest:.1f}",
                 "-" if there is None else f"{there:+.1f}",
             )
@@ -101,8 +101,10 @@ def mean_of(driven: DrivenRow, score: str) -> float | None:
     return sum(values) / len(values) if values else None
 
 
-def _small_but_clear(row: RowFinding) -> bool:
-    return row.verdict == EQUIVALENT and row.difference.clear
+def _verdict_text(row: RowFinding) -> str:
+    small_but_sure = row.verdict == EQUIVALENT and row.difference.clear
+    so_far = "" if row.driven.complete else ", so far"
+    return f"{row.verdict}{', not 0' if small_but_sure else ''}{so_far}"
 
 
 def infraction_text(row: RowFinding) -> str:
@@ -147,7 +149,7 @@ def notes(ablation: Ablation) -> list[str]:
     if _has_paper(ablation):
         lines.append(
             "paper: difference of DS in Table 2 of Li et al., 2024; its model had Town05 in "
-            "training, ours had not; its rows have no interval."
+            "training, the shipped policy had not; its rows have no interval."
         )
     baseline = mean_of(study.baseline, "driving_score")
     if baseline is not None and baseline < _LOW_DS:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists
 
 from leaderboard.confidence import t_quantile
@@ -77,6 +77,7 @@ def test_the_same_route_twice_is_one_route():
     assert (twice.low, twice.high, twice.routes) == (once.low, once.high, 3)
 
 
+@settings(deadline=None, max_examples=25)
 @given(lists(floats(-100.0, 100.0), min_size=2, max_size=8), integers(1, 30))
 def test_more_rows_widen_the_interval_and_never_make_a_verdict_surer(differences, tests):
     routes = [str(number) for number in range(len(differences))]
