@@ -134,9 +134,7 @@ def drive_responses(
         drive=drive_hash(record),
         route_hash=record.route_hash,
         every_s=every * env.config.control_dt_s,
-        events=tuple(
-            (e.time_s, SHORT_NAMES[e.kind]) for e in record.events if e.kind in SHORT_NAMES
-        ),
+        events=_events(run, record),
         groups=responses[0].groups,
         situations=SITUATIONS,
         time_s=np.array(times),

@@ -15,7 +15,9 @@ from agents.driveinsight.config import PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.responses import responses_at
+from di_envs.world.state import EventKind
 from leaderboard.cli import EXIT_USAGE, main
+from leaderboard.record import EventRecord
 from leaderboard.responding import measuring
 from leaderboard.responding.drive_responses import drive_responses
 from leaderboard.responding.response_files import (
@@ -73,6 +75,17 @@ def test_every_third_decision_is_looked_at_as_it_was_made(run, found):
             response = responses_at(agent, decision.seen, decision.memory)
     assert np.array_equal(found.gradient[2], response.gradient)
     assert np.array_equal(found.waypoints[2], response.waypoints)
+
+
+def test_only_what_the_rules_count_is_marked(run, found):
+    record = run.routes[0]
+    event = EventRecord(kind=EventKind.MIN_SPEED, tick=5, time_s=0.25, x=0.0, y=0.0, z=0.0)
+    red = dataclasses.replace(event, kind=EventKind.RED_LIGHT, time_s=0.7)
+    record = dataclasses.replace(record, events=(event, red))
+    env = retrace_env(run, prompt=True)
+    marked = drive_responses(run, record, run_agent(run, env), every_s=0.6, env=env)
+    assert marked.events == ((0.7, "red light"),)
+    assert marked.drive != found.drive
 
 
 def test_strength_and_share_follow_from_the_gradients(found):
