@@ -10,7 +10,7 @@ from agents.expert_control import pedals, steering
 from agents.expert_junction import crossing_acceleration, exit_acceleration, junction_ahead
 from agents.expert_line import Progress, localise
 from agents.expert_path import CHANGE_END_M, CHANGE_ROOM_M
-from agents.expert_rules import line_acceleration, next_line, stops_here
+from agents.expert_rules import line_acceleration, next_line, stands_at
 from agents.expert_sight import (
     BEST,
     FRONT_OK,
@@ -32,22 +32,24 @@ MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls 
 @kernel
 def start_progress():
     """The memory at a path's start."""
-    return Progress(0.0, 0, 0.0, 1.0, 0, False, 0.0)
+    return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0)
 
 
 @kernel
-def update_progress(path, progress, x, y, speed, half_length):
+def update_progress(path, progress, x, y, speed, half_length, numbers):
     """The memory, brought up to where the car is now."""
     station, _, _ = localise(path, progress, x, y)
     line = next_line(path, progress.line, station - half_length)
-    stopped = progress.stopped and line == progress.line
+    stood_s = progress.stood_s if line == progress.line else 0.0
+    if stands_at(path, line, station + half_length, speed):
+        stood_s += numbers.dt_s
     return Progress(
         station,
         progress.changes,
         progress.change_begin_m,
         progress.change_length_m,
         line,
-        stopped or stops_here(path, line, station + half_length, speed),
+        stood_s,
         progress.waiting_s,
     )
 
@@ -80,7 +82,7 @@ def begin_change(path, progress, speed, free, numbers):
             progress.change_begin_m,
             progress.change_length_m,
             progress.line,
-            progress.stopped,
+            progress.stood_s,
             waiting,
         )
     room = path.change_limit_m[k] - CHANGE_END_M - progress.station_m
@@ -89,7 +91,7 @@ def begin_change(path, progress, speed, free, numbers):
     wanted = min(max(numbers.change_time_s * speed, CHANGE_ROOM_M), LONGEST_CHANGE_M)
     length = max(min(wanted, room), SHORTEST_CHANGE_M)
     return Progress(
-        progress.station_m, k + 1, progress.station_m, length, progress.line, progress.stopped, 0.0
+        progress.station_m, k + 1, progress.station_m, length, progress.line, progress.stood_s, 0.0
     )
 
 
@@ -120,7 +122,7 @@ def decide(path, progress, actors, ways, lights, ego, numbers, model):
     """
     x, y, yaw = actors.x[ego], actors.y[ego], actors.yaw[ego]
     speed, half = actors.speed[ego], actors.half_length[ego]
-    progress = update_progress(path, progress, x, y, speed, half)
+    progress = update_progress(path, progress, x, y, speed, half, numbers)
     times = np.empty(FORECAST_M)
     forecast(path, progress.station_m, speed, numbers, times)
     junction, first, last, begin_m, end_m = junction_ahead(path, progress, half)

@@ -18,7 +18,7 @@ class Progress(NamedTuple):
     change_begin_m: float  # station where the latest of them began
     change_length_m: float
     line: int  # next stop line
-    stopped: bool  # the stop for that line's sign was made
+    stood_s: float  # for which it has stood at that line
     waiting_s: float  # for which it has waited for a gap to change lanes
 
 

@@ -25,7 +25,8 @@ TAIL_FROM = 0.8  # the rule's tail begins this many half lengths behind the cent
 TAIL_MARGIN_M = 0.1
 CRAWLING_MPS = 3.0
 HOLD_MPS2 = 1.0
-STOP_NEAR_M = 1.5  # a stop for a sign counts this near the line
+STOP_NEAR_M = 1.5  # a stop for a sign counts this near the line, …
+STOP_S = 0.95  # … after a second, but for rounding: who looks each half second sees it
 
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 _RED = int(LightState.RED)
@@ -112,7 +113,7 @@ def line_acceleration(path, progress, lights, speed, half_length, times, queue, 
                     lights, signal, line, station, half_length, speed, times, queue, numbers
                 )
                 best = min(best, allowed)
-        elif path.line_kind[q] == _STOP and not (q == progress.line and progress.stopped):
+        elif path.line_kind[q] == _STOP and not (q == progress.line and progress.stood_s >= STOP_S):
             if not numbers.ignore_signs and line - front > -PAST_LINE_M:
                 best = min(best, stop_within(line - numbers.line_margin_m - front, speed, numbers))
     return best
@@ -127,8 +128,8 @@ def next_line(path, line, tail_m):
 
 
 @kernel
-def stops_here(path, line, front_m, speed):
-    """Whether the car stands at its next line, so that the stop for a sign is made."""
+def stands_at(path, line, front_m, speed):
+    """Whether the car stands at its next line."""
     if line >= path.line_m.size or speed > 0.05:
         return False
     return path.line_m[line] - front_m < STOP_NEAR_M
