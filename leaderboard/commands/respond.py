@@ -55,7 +55,7 @@ class Respond:
     """Time between two moments that are looked at; 0.1 is every decision."""
 
     at: Annotated[tuple[float, ...], says("SECONDS ...", "three of different situations")] = ()
-    """Moments to mark in the figures."""
+    """Moments to mark in the figures of --route."""
 
     agent: Annotated[str | None, says("AGENT", "the run's")] = None
     """Where the agent is found now, if its weights have moved."""

@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 from short_drives import short_run
 
-from agents.driveinsight.config import PlannerConfig, PolicyConfig
+from agents.driveinsight.config import CameraEncoderConfig, GridConfig, PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.responses import responses_at
@@ -86,6 +86,27 @@ def test_only_what_the_rules_count_is_marked(run, found):
     marked = drive_responses(run, record, run_agent(run, env), every_s=0.6, env=env)
     assert marked.events == ((0.7, "red light"),)
     assert marked.drive != found.drive
+
+
+def test_a_policy_with_sensors_and_a_memory_is_looked_at_as_it_drove_edits_and_all(tmp_path):
+    config = PolicyConfig(
+        name="sensors",
+        grid=GridConfig(cells=24),
+        camera=CameraEncoderConfig(rig="rl", width=4, channels=4, depth_bins=4),
+        lidar=None,
+        planner=PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4),
+        bev_width=4,
+    )
+    torch.manual_seed(0)
+    save_pretrained(Policy(config), tmp_path, "a card")
+    edits = ("drop:bev@t<0.55", "set:speed=3")
+    run = short_run(f"driveinsight:{tmp_path}", 8, interventions=edits, traffic=0, walkers=0)
+    env = retrace_env(run, prompt=True)
+    found = drive_responses(run, run.routes[0], run_agent(run, env), every_s=0.1, env=env)
+    bev = found.strength[:, found.groups.index("bev")]
+    assert (bev[:6] == 0.0).all()  # cut off behind its tap
+    assert (bev[6:] > 0.0).all()
+    assert found.agent.endswith("with drop:bev@t<0.55; set:speed=3")
 
 
 def test_strength_and_share_follow_from_the_gradients(found):
