@@ -41,6 +41,12 @@ class Lesson:
     frames: int = 14_000
     """Moments of the expert's driving, half a second apart."""
 
+    towns: tuple[str, ...] = ()
+    """Where it drives; all seven if none is named."""
+
+    route_ids: tuple[str, ...] = ()
+    """Routes of the suite that are driven in the end; all if none is named."""
+
     steps: int = 2000
     """Updates of the weights."""
 
@@ -69,6 +75,7 @@ def run(command: str, *arguments: object) -> None:
 def score(agent: str, folder: Path, lesson: Lesson) -> RunRecord:
     """Has an agent drive the suite; everything that it did is in the folder."""
     where = ("--output", folder, "--resume", "--workers", lesson.workers)
+    where += ("--route-ids", *lesson.route_ids) if lesson.route_ids else ()
     with redirect_stdout(io.StringIO()):  # a row for each route: `driveinsight show` has them
         run("evaluate", "--agent", agent, "--suite", SUITE, *where)
     return read_run(folder)
@@ -91,7 +98,9 @@ def side_by_side(runs: dict[str, RunRecord]) -> Table:
 def main(lesson: Lesson) -> None:
     """Collects, trains, drives, and prints the table."""
     data, trained = lesson.folder / "data", lesson.folder / "run"
-    run("collect", "--frames", lesson.frames, "--workers", lesson.workers, "--output", data)
+    towns = ("--towns", *lesson.towns) if lesson.towns else ()
+    many = ("--frames", lesson.frames, "--workers", lesson.workers)
+    run("collect", *many, "--output", data, *towns)
     how = ("--steps", lesson.steps, "--batch", lesson.batch, "--learning-rate")
     how = (*how, lesson.learning_rate, "--seed", lesson.seed, "--check-routes", 0)
     run("train", "--config", "tiny", "--data", data, "--output", trained, *how)

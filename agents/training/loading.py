@@ -54,6 +54,11 @@ class Moments:
     def __len__(self) -> int:
         return len(self.drive)
 
+    @property
+    def drives(self) -> int:
+        """How many drives they are of."""
+        return len(np.unique(self.drive))
+
     def some(self, count: int) -> Moments:
         """So many of them, spread evenly: to see that a policy can learn them by heart."""
         return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))

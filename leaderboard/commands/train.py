@@ -125,7 +125,8 @@ class Train:
                 policy, config = self._configs(team)
                 with Console(stderr=True).status("reading drives"):
                     moments = load_moments(self.data, config.standing_share)
-                config = dataclasses.replace(config, data=moments.digest)
+                held_out = config.held_out if moments.drives > 1 else 0.0  # one is for learning
+                config = dataclasses.replace(config, data=moments.digest, held_out=held_out)
                 return self._train(Training.begin(policy, config, device, team), moments)
         except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
             raise UsageError(str(error)) from error
