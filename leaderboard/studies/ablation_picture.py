@@ -11,8 +11,8 @@ from leaderboard.studies.effects import EQUIVALENT, MARGIN_DS, MATTERS
 
 COLOURS = {MATTERS: "#b3261e", EQUIVALENT: "#1b7f5c"}
 GREY, BAND, PAPER = "#5f6670", "#e8ecef", "#2459a6"
-_ROW_IN, _HEAD_IN, _WIDTH_IN = 0.27, 1.25, 8.0  # inches
-_CROWDED = 14
+_NAME = 60  # letters of an agent that fit
+_ROW_IN, _HEAD_IN, _WIDTH_IN = 0.27, 1.4, 8.0  # inches
 
 
 def write_ablation_picture(path: Path, ablation: Ablation) -> bool:
@@ -73,11 +73,11 @@ def _title(ablation: Ablation) -> str:
     study = ablation.study
     drives = study.baseline.drives
     mean = sum(drive.driving_score for drive in drives) / max(len(drives), 1)
-    name = study.agent if len(study.agent) <= 40 else f"…{study.agent[-39:]}"
+    name = study.agent if len(study.agent) <= _NAME else f"…{study.agent[1 - _NAME :]}"
     seeds = f"{len(study.seeds)} seed{'s' if len(study.seeds) > 1 else ''}"
     return (
-        f"{name} on {study.suite}: baseline DS {mean:.1f}, {ablation.routes} distinct routes, "
-        f"{seeds}"
+        f"{name} on {study.suite}\n"
+        f"baseline DS {mean:.1f}, {ablation.routes} distinct routes, {seeds}"
     )
 
 

@@ -1,21 +1,22 @@
-"""Approaches to traffic lights, from replays: what a light really showed, and what the ego did.
+"""Lights that an ego meets, from replays: what they really showed, and what it did meanwhile.
 
-An approach begins when the ego comes within `APPROACH_M` of a stop line of its route, moving, and
-ends when it is over the line or the drive ends. What the light shows *in the world* is noted, not
-what the ego was told.
+A light is met once the ego comes within `APPROACH_M` of its stop line, moving, and until it is over
+the line. Each colour that the light shows meanwhile is a case: the ego drives over, or it stands
+before the line when the colour (or the drive) ends, or, still rolling, it has decided nothing.
+Colours are those *in the world*, whatever the ego was told.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from di_envs.route_env import RouteEnv
 from di_envs.town.lanes import LightState
 from leaderboard.bound import PerfectDriver, StopPoint, stop_points
 from leaderboard.record import RouteRecord, RunRecord
 from leaderboard.replay import replay
-from leaderboard.studies.effects import Effect, effect
+from leaderboard.studies.effects import Effect, share_effect
 from leaderboard.studies.experiments import Judgement, Verdict
 from leaderboard.studies.numbers import effect_numbers, span_text
 from leaderboard.studies.route_place import RoutePlace
@@ -29,24 +30,24 @@ RED_SHOWN, GREEN_SHOWN = "recolour:lights=red", "recolour:lights=green"
 
 @dataclass(frozen=True, kw_only=True)
 class Approach:
-    """An approach.
+    """A light before the ego, while it showed one colour.
 
     Attributes:
-        colour: What the light showed as it began, `green`, `yellow` or `red`.
-        stood: Whether the ego came to a stand before the line while it still showed that.
-        crossed: Whether it went over the line while it still showed that.
+        colour: `green`, `yellow` or `red`.
+        crossed: Whether the ego went over the line meanwhile.
+        held: Whether it stood before the line when that ended.
     """
 
     route_id: str
     seed: int
     route_hash: str
     colour: str
-    stood: bool
     crossed: bool
+    held: bool
 
 
 def approaches(run: RunRecord, record: RouteRecord, env: RouteEnv) -> list[Approach]:
-    """The approaches of a recorded drive.
+    """The lights that were met in a recorded drive, colour by colour.
 
     Args:
         run: The run.
@@ -56,42 +57,45 @@ def approaches(run: RunRecord, record: RouteRecord, env: RouteEnv) -> list[Appro
     watched: list[_Watched] = []
     place: RoutePlace | None = None
     for step in replay(run, record, env=env):
-        state = step.view.state
+        state, ego = step.view.state, step.view.ego
         if place is None:
-            driver = PerfectDriver()
             place = RoutePlace(env.plan)
-            stops = [s for s in stop_points(step.view.town, env.plan, driver) if s.light >= 0]
-            watched = [_Watched(stop=stop) for stop in stops]
-        ego = step.view.ego
+            stops = stop_points(step.view.town, env.plan, PerfectDriver())
+            watched = [_Watched(stop=stop) for stop in stops if stop.light >= 0]
         place.move(float(state.x[ego]), float(state.y[ego]), float(state.yaw[ego]))
-        speed_mps = float(state.speed[ego])
         for each in watched:
-            each.look(place.route_m, speed_mps, int(state.light[each.stop.light]))
+            light = LightState(int(state.light[each.stop.light]))
+            each.look(place.route_m, float(state.speed[ego]), light)
     return [
         Approach(
             route_id=record.route_id,
             seed=record.seed,
             route_hash=record.route_hash,
-            colour=LightState(each.colour).name.lower(),
-            stood=each.stood,
-            crossed=each.crossed,
+            colour=colour.name.lower(),
+            crossed=crossed,
+            held=held,
         )
         for each in watched
-        if each.colour is not None and each.colour != LightState.NONE
+        for colour, crossed, held in each.cases()
     ]
 
 
 @dataclass
 class _Watched:
-    """A stop line that the ego may come to."""
+    """A stop line that the ego may come to.
+
+    Attributes:
+        colour: What its light shows now that it is met; None before and after.
+        done: Colours that have ended: crossed, held.
+    """
 
     stop: StopPoint
-    colour: int | None = None
-    stood: bool = False
-    crossed: bool = False
+    colour: LightState | None = None
+    standing: bool = False
     over: bool = False
+    done: list[tuple[LightState, bool, bool]] = field(default_factory=list)
 
-    def look(self, route_m: float, speed_mps: float, colour: int) -> None:
+    def look(self, route_m: float, speed_mps: float, colour: LightState) -> None:
         """A moment of the drive."""
         ahead_m = self.stop.route_m - route_m
         if self.over:
@@ -100,25 +104,36 @@ class _Watched:
             if 0.0 < ahead_m <= APPROACH_M and speed_mps > MOVING_MPS:
                 self.colour = colour
             return
+        if ahead_m < -OVER_M:
+            self.done.append((self.colour, True, False))
+            self.over, self.colour = True, None
+            return
         if colour != self.colour:
-            self.over = True  # what it does now, it does for another colour
-        elif ahead_m < -OVER_M:
-            self.crossed = self.over = True
-        elif speed_mps < STANDING_MPS:
-            self.stood = True
+            self.done.append((self.colour, False, self.standing))
+            self.colour = colour
+        self.standing = speed_mps < STANDING_MPS
+
+    def cases(self) -> list[tuple[LightState, bool, bool]]:
+        """All of them, the one that the drive ended in too."""
+        last = [] if self.colour is None else [(self.colour, False, self.standing)]
+        return [*self.done, *last]
 
 
-def braked_for_green(found: Sequence[Approach]) -> list[tuple[float, str]]:
-    """1 or 0 for each approach to a green light, and its route: whether the ego stood there."""
-    return [(float(a.stood), a.route_hash) for a in found if a.colour == "green"]
+def held_at_green(found: Sequence[Approach]) -> list[tuple[float, str]]:
+    """1 or 0 for each green light that the ego decided about, and its route: did it stand?"""
+    return [
+        (float(a.held), a.route_hash)
+        for a in found
+        if a.colour == "green" and (a.crossed or a.held)
+    ]
 
 
 def ran_red(found: Sequence[Approach]) -> list[tuple[float, str]]:
-    """1 or 0 for each approach to a red light at which the ego stood or went over: did it go?"""
+    """1 or 0 for each red light that the ego decided about, and its route: did it drive over?"""
     return [
-        (float(a.crossed and not a.stood), a.route_hash)
+        (float(a.crossed), a.route_hash)
         for a in found
-        if a.colour == "red" and (a.crossed or a.stood)
+        if a.colour == "red" and (a.crossed or a.held)
     ]
 
 
@@ -126,26 +141,26 @@ def judge_lights(measured: Mapping[str, Sequence[Approach]]) -> Judgement | None
     """Whether the ego is led by the colours that it is shown.
 
     Args:
-        measured: Approaches by the row's edit, the baseline's under an empty one.
+        measured: Lights met, by the row's edit, the baseline's under an empty one.
 
     Returns:
-        None unless both ways were driven and had approaches.
+        None unless both ways were driven and the ego met lights of the colour in question.
     """
     shares: dict[str, Effect] = {}
     unedited: dict[str, list[float]] = {}
-    for edit, measure in ((RED_SHOWN, braked_for_green), (GREEN_SHOWN, ran_red)):
-        pairs = measure(measured.get(edit, ()))
-        if not pairs:
+    for edit, measure in ((RED_SHOWN, held_at_green), (GREEN_SHOWN, ran_red)):
+        cases = measure(measured.get(edit, ()))
+        if not cases:
             return None
-        shares[edit] = effect(
-            [share for share, _ in pairs], [route for _, route in pairs], tests=2, margin=LED
+        shares[edit] = share_effect(
+            [share for share, _ in cases], [route for _, route in cases], tests=2, margin=LED
         )
         unedited[edit] = [share for share, _ in measure(measured.get("", ()))]
     red, green = shares[RED_SHOWN], shares[GREEN_SHOWN]
     sentence = (
-        f"shown red at a green light, the ego stands before the line in {_share(red)} "
-        f"(unedited: {_plain(unedited[RED_SHOWN])}); shown green at a red light, it drives over "
-        f"in {_share(green)} (unedited: {_plain(unedited[GREEN_SHOWN])})"
+        f"green lights shown as red: the ego stands before {_share(red)} "
+        f"(unedited: {_plain(unedited[RED_SHOWN])}); red lights shown as green: it drives over "
+        f"{_share(green)} (unedited: {_plain(unedited[GREEN_SHOWN])})"
     )
     return Judgement(
         experiment="lights",
@@ -154,7 +169,7 @@ def judge_lights(measured: Mapping[str, Sequence[Approach]]) -> Judgement | None
         numbers={
             "shares": {edit: effect_numbers(share) for edit, share in shares.items()},
             "unedited": {
-                edit: {"mean": sum(each) / len(each) if each else None, "approaches": len(each)}
+                edit: {"mean": sum(each) / len(each) if each else None, "lights": len(each)}
                 for edit, each in unedited.items()
             },
         },
@@ -162,12 +177,12 @@ def judge_lights(measured: Mapping[str, Sequence[Approach]]) -> Judgement | None
 
 
 def _share(found: Effect) -> str:
-    return f"{100 * found.mean:.0f} % of {found.pairs} approaches ({span_text(found, 100.0, ' %')})"
+    return f"{100 * found.mean:.0f} % of {found.pairs} ({span_text(found, 100.0, ' %')})"
 
 
 def _plain(values: Sequence[float]) -> str:
     if not values:
-        return "no such approach"
+        return "none met"
     return f"{100 * sum(values) / len(values):.0f} % of {len(values)}"
 
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -122,6 +122,38 @@ def effect(
         routes=count,
         means=means,
     )
+
+
+def share_effect(
+    shares: Sequence[float],
+    routes: Sequence[str],
+    *,
+    least: float = 0.0,
+    tests: int = 1,
+    margin: float = MARGIN_DS,
+    alpha: float = ALPHA,
+) -> Effect:
+    """As `effect`, of values up to 1 that are often all the same.
+
+    Of what was the same on n routes a bootstrap says that it always is. Here the interval then
+    reaches as far as chance could still have hidden it, up to a share p with (1 - p)^n = tail.
+
+    Args:
+        least: The least that a value can be: 0 for shares, -1 for differences of them.
+
+    Source: Clopper, Pearson: The Use of Confidence or Fiducial Limits, Biometrika 1934.
+    """
+    found = effect(shares, routes, tests=tests, margin=margin, alpha=alpha)
+    if found.means is None or float(np.ptp(found.means)) > 0.0:
+        return found
+
+    def reach(tail: float) -> tuple[float, float]:
+        hidden = 1.0 - tail ** (1.0 / found.routes)
+        return max(found.mean - hidden, least), min(found.mean + hidden, 1.0)
+
+    low, high = reach(alpha / tests / 2.0)
+    inner_low, inner_high = reach(alpha / tests)
+    return replace(found, low=low, high=high, inner_low=inner_low, inner_high=inner_high)
 
 
 def interval(means: NDArray[np.float64], routes: int, tail: float) -> tuple[float, float]:

@@ -8,10 +8,11 @@ short route has timed out, so the two count as one here.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 from leaderboard.studies.ablation import Pairs, paired
-from leaderboard.studies.effects import Effect, effect
+from leaderboard.studies.effects import Effect, share_effect
 from leaderboard.studies.experiments import Judgement, Verdict
 from leaderboard.studies.numbers import effect_numbers, span_text
 from leaderboard.studies.record import Drive, Study
@@ -26,7 +27,7 @@ FAILURES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 ANY = "any of these"
 _OF_THE_MAP = ("wrong lane or off road", "blocked or timed out")
-NO_INCREASE = 0.1  # fewer than one drive in ten more
+NO_INCREASE = 0.15  # fewer than that share of drives more: of no importance
 
 
 def failure_effects(
@@ -44,12 +45,20 @@ def failure_effects(
 
 
 def _effect(pairs: Pairs, failure: str, tests: int) -> Effect:
-    return effect(
-        [has_failed(after, failure) - has_failed(before, failure) for before, after in pairs],
-        [before.route_hash for before, _ in pairs],
-        tests=tests,
-        margin=NO_INCREASE,
-    )
+    """The interval corrected for all that is looked at; the one-sided tests each by itself.
+
+    "No increase" is claimed only if each of these tests says so, which needs no correction.
+    """
+    more = [has_failed(after, failure) - has_failed(before, failure) for before, after in pairs]
+    routes = [before.route_hash for before, _ in pairs]
+    among = share_effect(more, routes, least=-1.0, tests=tests, margin=NO_INCREASE)
+    alone = share_effect(more, routes, least=-1.0, margin=NO_INCREASE)
+    return replace(among, inner_low=alone.inner_low, inner_high=alone.inner_high)
+
+
+def _no_increase(found: Effect) -> bool:
+    """Whether an increase of any importance is ruled out."""
+    return found.inner_high is not None and found.inner_high < NO_INCREASE
 
 
 def has_failed(drive: Drive, failure: str) -> float:
@@ -66,7 +75,7 @@ def judge_map(study: Study) -> Judgement | None:
     each = [effect for row in found.values() for effect in row.values()]
     if any(one.low is not None and one.low > 0.0 for one in each):
         verdict = Verdict.DOES_NOT_HOLD
-    elif all(one.inner_high is not None and one.inner_high < NO_INCREASE for one in each):
+    elif all(_no_increase(one) for one in each):
         verdict = Verdict.HOLDS
     else:
         verdict = Verdict.UNDECIDED
@@ -81,7 +90,7 @@ def judge_bev(study: Study) -> Judgement | None:
     strongest = list(found.values())[-1][ANY]
     if strongest.low is not None and strongest.low > 0.0:
         verdict = Verdict.HOLDS
-    elif strongest.inner_high is not None and strongest.inner_high < NO_INCREASE:
+    elif _no_increase(strongest):
         verdict = Verdict.DOES_NOT_HOLD
     else:
         verdict = Verdict.UNDECIDED

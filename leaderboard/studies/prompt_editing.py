@@ -106,7 +106,7 @@ def _judge(experiment: Experiment, bench: Bench) -> tuple[Judgement | None, str]
         if experiment.rows:
             raise
         return None, str(error)
-    return judgement, "too little was driven to say anything"
+    return judgement, "the drives met nothing that it asks about"
 
 
 def _judge_route(bench: Bench) -> Judgement | None:

@@ -74,8 +74,8 @@ def _draw_speed(axes: Any, numbers: Mapping[str, Any]) -> None:
 def _draw_lights(axes: Any, numbers: Mapping[str, Any]) -> None:
     """Shares of approaches, edited and not."""
     names = {
-        RED_SHOWN: "green shown as red:\nstands before it",
-        GREEN_SHOWN: "red shown as green:\ndrives over",
+        RED_SHOWN: "green shown as red:\nthe ego stands",
+        GREEN_SHOWN: "red shown as green:\nthe ego drives over",
     }
     for place, edit in enumerate(names):
         _dot(axes, numbers["shares"][edit], place, WARM, "edited" if place == 0 else None)
@@ -85,7 +85,7 @@ def _draw_lights(axes: Any, numbers: Mapping[str, Any]) -> None:
             axes.plot(100 * plain, place, "s", color=FAINT, label=label)
     _names(axes, [*names.values()])
     axes.set_xlim(-5.0, 105.0)
-    axes.set_xlabel("percent of approaches")
+    axes.set_xlabel("percent of the lights met")
     axes.legend(frameon=False, fontsize=8)
 
 
@@ -101,6 +101,8 @@ def _draw_failures(axes: Any, numbers: Mapping[str, Any]) -> None:
             _dot(axes, row[name], place + aside, colour, edit if place == 0 else None)
     before = numbers["unedited"]
     _names(axes, [f"{name}\n(unedited {100 * before[name]:.0f} %)" for name in names])
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, -10.0), max(high, 10.0))
     axes.set_xlabel("how many more drives, in percent of all")
     axes.legend(frameon=False, fontsize=8)
 

@@ -10,7 +10,14 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists
 
 from leaderboard.confidence import t_quantile
-from leaderboard.studies.effects import EQUIVALENT, MATTERS, UNDECIDED, effect, spearman
+from leaderboard.studies.effects import (
+    EQUIVALENT,
+    MATTERS,
+    UNDECIDED,
+    effect,
+    share_effect,
+    spearman,
+)
 
 HUNDRED = [str(number) for number in range(100)]
 
@@ -69,6 +76,20 @@ def test_the_margin_is_asked_for_by_two_one_sided_tests():
     assert found.inner_high == pytest.approx(4.83, abs=0.06)
     assert found.verdict == EQUIVALENT
     assert effect([-0.5, 9.5] * 50, HUNDRED).verdict == MATTERS  # 5.33, and clear of 0
+
+
+def test_what_never_happened_on_ten_routes_may_still_happen_on_a_quarter():
+    """(1 - p)^10 = 0.05 at p = 0.259, and 0.025 at p = 0.308."""
+    never = share_effect([0.0] * 10, list("abcdefghij"))
+    assert (never.low, never.inner_low) == (0.0, 0.0)
+    assert never.inner_high == pytest.approx(0.2589, abs=1e-4)
+    assert never.high == pytest.approx(0.3085, abs=1e-4)
+    always = share_effect([1.0] * 10, list("abcdefghij"))
+    assert (always.low, always.high) == (pytest.approx(0.6915, abs=1e-4), 1.0)
+    same = share_effect([0.0] * 10, list("abcdefghij"), least=-1.0)
+    assert same.low == pytest.approx(-0.3085, abs=1e-4)
+    varied = [0.0, 1.0] * 5
+    assert share_effect(varied, list("abcdefghij")) == effect(varied, list("abcdefghij"))
 
 
 def test_the_same_route_twice_is_one_route():

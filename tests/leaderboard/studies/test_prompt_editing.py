@@ -25,7 +25,7 @@ from leaderboard.studies.approaches import (
     RED_SHOWN,
     Approach,
     approaches,
-    braked_for_green,
+    held_at_green,
     judge_lights,
     ran_red,
 )
@@ -43,6 +43,7 @@ from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.studies.drives_here import FOLLOWER, drive, row, study
 
 HASHES = [f"route {number}" for number in range(12)]
+MANY = [f"route {number}" for number in range(30)]
 
 
 def straight(length_m=100):
@@ -138,48 +139,51 @@ def test_without_all_three_rows_there_is_no_judgement():
     assert judge_route(moved({"routing": 0.5})) is None
 
 
-def seen(colour, *, stood=False, crossed=False, count=12):
+def seen(colour, *, held=False, crossed=False, count=12):
     return [
-        Approach(
-            route_id=name, seed=0, route_hash=name, colour=colour, stood=stood, crossed=crossed
-        )
+        Approach(route_id=name, seed=0, route_hash=name, colour=colour, held=held, crossed=crossed)
         for name in HASHES[:count]
     ]
 
 
-def test_only_approaches_to_the_colour_in_question_count():
-    some = [*seen("green", stood=True, count=2), *seen("red", crossed=True, count=3)]
+def test_only_lights_of_the_colour_in_question_count_that_the_ego_decided_about():
+    some = [*seen("green", held=True, count=2), *seen("red", crossed=True, count=3)]
     some += [*seen("yellow", count=4), *seen("red", count=5)]  # of the last ones nothing came
-    assert [share for share, _ in braked_for_green(some)] == [1.0, 1.0]
+    assert [share for share, _ in held_at_green(some)] == [1.0, 1.0]
     assert [share for share, _ in ran_red(some)] == [1.0, 1.0, 1.0]
 
 
 def test_the_lights_experiment_counts_shares_of_approaches(tmp_path):
     led = {
-        "": [*seen("green", crossed=True), *seen("red", stood=True)],
-        RED_SHOWN: seen("green", stood=True),
+        "": [*seen("green", crossed=True), *seen("red", held=True)],
+        RED_SHOWN: seen("green", held=True),
         GREEN_SHOWN: seen("red", crossed=True),
     }
     judgement = judge_lights(led)
     assert judgement.verdict == Verdict.HOLDS
-    assert "100 % of 12 approaches" in judgement.sentence
+    assert "the ego stands before 100 % of 12" in judgement.sentence
     assert "(unedited: 0 % of 12)" in judgement.sentence
-    assert finding_sentence(judgement).startswith("The paper's finding holds here: shown red")
+    assert finding_sentence(judgement).startswith("The paper's finding holds here: green lights")
     stubborn = judge_lights({**led, RED_SHOWN: seen("green", crossed=True)})
     assert stubborn.verdict == Verdict.DOES_NOT_HOLD
     assert judge_lights({"": []}) is None
+    three = {
+        RED_SHOWN: seen("green", held=True, count=3),
+        GREEN_SHOWN: seen("red", crossed=True, count=3),
+    }
+    assert judge_lights(three).verdict == Verdict.UNDECIDED  # three of three may be chance
     assert write_prompt_picture(tmp_path / "lights.png", judgement)
     with Image.open(tmp_path / "lights.png") as image:
         assert image.width > 500
 
 
-def edited_study(experiment, events):
-    """Twelve routes; under each edit of the experiment these events happen."""
-    routes = [drive(name, route_hash=name) for name in HASHES]
+def edited_study(experiment, events, names=MANY):
+    """Thirty routes; under each edit of the experiment these events happen."""
+    routes = [drive(name, route_hash=name) for name in names]
     rows = [
         DrivenRow(
             row=each,
-            planned=12,
+            planned=len(names),
             drives=tuple(dataclasses.replace(one, episode="x", events=events) for one in routes),
         )
         for each in EXPERIMENTS[experiment].rows
@@ -198,6 +202,8 @@ def test_the_map_experiment_asks_whether_more_drives_fail(tmp_path):
     calm = judge_map(edited_study("map", {}))
     assert calm.verdict == Verdict.HOLDS
     assert judge_map(edited_study("map", {"red_light": 1})).verdict == Verdict.HOLDS
+    few = judge_map(edited_study("map", {}, HASHES))
+    assert few.verdict == Verdict.UNDECIDED  # on 12 routes chance can hide one drive in three
     lost = judge_map(edited_study("map", {"route_deviation": 1}))
     assert lost.verdict == Verdict.DOES_NOT_HOLD
     assert "wrong lane or off road +100 %" in lost.sentence
@@ -250,7 +256,7 @@ def test_an_agent_that_knows_no_lights_drives_over_the_red_ones_that_it_meets():
     env = replay_env(run)
     found = approaches(run, run.routes[0], env)
     assert found
-    assert not any(each.stood for each in found)
+    assert not any(each.held for each in found)
     reds = sum(each.colour == "red" and each.crossed for each in found)
     events = sum(event.kind.name == "RED_LIGHT" for event in run.routes[0].events)
     assert reds <= events <= reds + sum(not each.crossed for each in found)
