@@ -22,20 +22,21 @@ FORMAT_VERSION = 1  # of configurations and weights; a change of the network rai
 BEV = "bev"  # the component that is no prompt: the features of cameras and LiDAR
 TOKENS = (*COMPONENTS, BEV)
 
-# How often training hides a component, fixed before any ablation was run. What tells the way is
-# hidden least, as hiding it leaves the target undefined; what cameras show too is hidden more.
+# How often training hides a component, fixed before any ablation of a shipped policy was run. What
+# tells the way is hidden least, as hiding it leaves the target undefined; what cameras show too is
+# hidden more. Two samples in five are seen whole: so one sees how to drive with all that there is.
 DROPOUT: Mapping[str, float] = MappingProxyType(
     {
-        "command": 0.15,
-        "target_point": 0.1,
-        "routing": 0.1,
-        "map": 0.2,
-        "obstacles": 0.2,
-        "traffic_lights": 0.2,
-        "stop_signs": 0.2,
-        "speed": 0.2,
-        "speed_history": 0.3,
-        BEV: 0.1,
+        "command": 0.075,
+        "target_point": 0.05,
+        "routing": 0.05,
+        "map": 0.1,
+        "obstacles": 0.1,
+        "traffic_lights": 0.1,
+        "stop_signs": 0.1,
+        "speed": 0.1,
+        "speed_history": 0.15,
+        BEV: 0.05,
     }
 )
 
@@ -272,7 +273,7 @@ CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
                     layers=2,
                     bev_tokens=6,
                     # minutes of training, for driving with all that there is: little is hidden
-                    dropout={component: rate / 4 for component, rate in DROPOUT.items()},
+                    dropout={component: rate / 2 for component, rate in DROPOUT.items()},
                 ),
                 memory_frames=0,
                 bev_width=16,
