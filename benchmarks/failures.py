@@ -1,0 +1,102 @@
+"""What went wrong in a run, by kind: how often, and the first of each kind from above.
+
+driveinsight evaluate --agent driveinsight --suite town05_long
+python benchmarks/failures.py results/driveinsight-town05_long --picture failures.jpg
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+from PIL import Image, ImageDraw, ImageFont
+
+from di_envs.course import load_course
+from di_envs.render import MAP_PX, Renderer
+from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.replay import replay, replay_env
+from leaderboard.results import read_run
+from leaderboard.rules import rules_named
+
+BEFORE_S = (3.0, 1.5, 0.0)  # moments before an infraction that are shown
+PANEL_PX, TITLE_PX, GAP_PX = 300, 26, 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failures:
+    """Which run to look at."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of results."""
+
+    picture: Path | None = None
+    """Where to draw the first of each kind."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """An infraction: which route, and when."""
+
+    record: RouteRecord
+    time_s: float
+    words: str
+
+
+def failures_of(run: RunRecord) -> Mapping[str, Sequence[Failure]]:
+    """All infractions that the run's rules count, by kind, the most frequent first."""
+    scored = rules_named(run.rules).scored
+    found: dict[str, list[Failure]] = defaultdict(list)
+    for record in run.routes:
+        for event in record.events:
+            if event.kind in scored:
+                kind = event.kind.name.lower().replace("_", " ")
+                words = f"{kind} {event.other_type}".rstrip()
+                found[kind].append(Failure(record=record, time_s=event.time_s, words=words))
+    return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+
+
+def moments(run: RunRecord, failure: Failure) -> Iterator[Any]:
+    """The streets around the ego just before an infraction."""
+    env = replay_env(run)
+    renderer = Renderer(load_course(env.config.changes()))
+    wanted = [max(failure.time_s - before, 0.0) for before in BEFORE_S]
+    edge = (MAP_PX - PANEL_PX) // 2
+    for step in replay(run, failure.record, env=env):
+        if wanted and step.time_s >= wanted[0] - 1e-6:
+            wanted.pop(0)
+            yield renderer.map(step.view).crop((edge, edge, edge + PANEL_PX, edge + PANEL_PX))
+
+
+def draw(run: RunRecord, kinds: Mapping[str, Sequence[Failure]]) -> Any:
+    """A row for the first infraction of each kind."""
+    width, height = len(BEFORE_S) * (PANEL_PX + GAP_PX), PANEL_PX + TITLE_PX
+    picture = Image.new("RGB", (width, len(kinds) * height), "#ffffff")
+    pen, font = ImageDraw.Draw(picture), ImageFont.load_default(15)
+    for row, failures in enumerate(kinds.values()):
+        first = failures[0]
+        title = f"{first.words}: route {first.record.route_id}, {first.time_s:.1f} s; "
+        shown = ", ".join(f"{before:g} s before" if before else "then" for before in BEFORE_S)
+        pen.text((GAP_PX, row * height + 4), title + shown, "#1d2126", font)
+        for column, image in enumerate(moments(run, first)):
+            picture.paste(image, (column * (PANEL_PX + GAP_PX), row * height + TITLE_PX))
+    return picture
+
+
+def main(arguments: Failures) -> None:
+    """Prints the counts; draws the first of each kind."""
+    run = read_run(arguments.run)
+    kinds = failures_of(run)
+    for kind, failures in kinds.items():
+        places = [f"{f.record.route_id} at {f.time_s:.1f} s" for f in failures[:4]]
+        print(f"{kind:18} {len(failures):4}   route {', '.join(places)}")
+    if arguments.picture and kinds:
+        draw(run, kinds).save(arguments.picture)
+        print(f"Written: {arguments.picture}")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Failures, description=__doc__))
