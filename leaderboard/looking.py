@@ -68,8 +68,8 @@ class Looking:
         self._poses.append(_pose(step.view))
         self._controls.append(decision.control)
         self._images += _front_image(decision)
-        for name in (*COMPONENTS, PRESENT):
-            if name in decision.seen:
+        if PRESENT in decision.seen:  # the speedometer alone is no prompt
+            for name in (*COMPONENTS, PRESENT):
                 self._seen.setdefault(name, []).append(np.array(decision.seen[name]))
         look = self.look(self.agent, decision.seen, decision.memory)
         self._looks += [] if look is None else [look]

@@ -80,10 +80,8 @@ def telling_events(future: Future, run: RunRecord) -> list[EventRecord]:
 
 
 def _what_happened(future: Future, run: RunRecord) -> str:
-    events = [
-        f"{event_text(event)} at {event.time_s:.1f} s" for event in telling_events(future, run)
-    ]
-    ends = future.status or f"driven to {future.end_s:.1f} s"
+    events = [f"{event_text(event)} at {event.time_s:g} s" for event in telling_events(future, run)]
+    ends = future.status or f"driven to {future.end_s:g} s"
     if future.problem:
         ends = f"{ends}: {future.problem}"
     return "; ".join((*events, ends))

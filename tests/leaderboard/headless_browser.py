@@ -117,6 +117,7 @@ def browser_page(browser: str, profile: Path) -> Iterator[Page]:
     ours_in, child_out = os.pipe()
     high_in, high_out = (fcntl.fcntl(fd, fcntl.F_DUPFD, _HIGH_FD) for fd in (child_in, child_out))
     options = ["--headless", "--remote-debugging-pipe", f"--user-data-dir={profile}"]
+    options.append("--disable-features=IsolateSandboxedIframes")  # they complain in their page too
     if os.geteuid() == 0:
         options.append("--no-sandbox")  # root may not have one
     process = subprocess.Popen(

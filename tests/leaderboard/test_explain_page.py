@@ -237,6 +237,56 @@ def test_a_browser_shows_the_moment_of_the_address_with_its_numbers(tab, page_fi
     assert {request.partition("#")[0] for request in tab.requests()} == {page_file.as_uri()}
 
 
+def test_a_browser_shows_it_in_a_notebooks_frame_too(tab, explained, tmp_path):
+    path = tmp_path / "notebook.html"
+    script = "document.querySelector('iframe').onload = () => { document.body.dataset.shown = ''; }"
+    path.write_text(f"<body>{explained._repr_html_()}<script>{script}</script>", encoding="utf-8")
+    before = len(tab.complaints())
+    tab.open(path)
+    tab.script("new Promise((done) => setTimeout(done, 700))")  # it names no address after 0.4 s
+    assert tab.complaints()[before:] == []
+
+
+INERTIAL = """
+from agents.base import Requirements, make_control
+
+
+class Inertial:
+    requires = Requirements(observations=("inertial",))
+
+    def start(self, plan, seed):
+        return None
+
+    def act(self, observation, memory):
+        return make_control(0.4 if observation["speed"][0] < 5.0 else 0.0, 0.0, 0.0), None
+
+    def close(self):
+        pass
+"""
+
+
+def test_a_browser_shows_what_there_is_of_an_agent_without_prompt_and_policy(tab, tmp_path):
+    (tmp_path / "inertial.py").write_text(INERTIAL)
+    run = short_run(f"{tmp_path / 'inertial.py'}:Inertial", 8)
+    explained = explain_route(
+        run, run.routes[0].route_id, at_s=0.4, what_if="set:speed=20", ahead_s=0.4
+    )
+    assert "Nothing is drawn of what the agent is told" in explained.missing[1]
+    path = tmp_path / "explain.html"
+    path.write_text(explained.to_html(), encoding="utf-8")
+    before = len(tab.complaints())
+    tab.open(path)
+    assert tab.script("document.body.dataset.shown") == "0.40"
+    hidden = "[...document.querySelectorAll('.layers label')].map((one) => one.hidden)"
+    assert tab.script(hidden) == [True] * 4
+    assert tab.script("document.getElementById('responses').hidden")
+    captions = "[...document.querySelectorAll('.pane figcaption')].map((one) => one.innerText)"
+    base, fast = tab.script(captions)
+    assert base.startswith("throttle 0.40")
+    assert fast.startswith("throttle 0.00")
+    assert tab.complaints()[before:] == []
+
+
 COLOURS = """((id) => { const canvas = document.getElementById(id);
     const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
     return new Set(new Uint32Array(data.buffer)).size; })"""

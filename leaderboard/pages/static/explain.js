@@ -25,6 +25,7 @@
   const bev = maps.find((map) => map.entry.extent_m !== null);
   const camera_map = maps.find((map) => map.entry.camera !== null);
   let colours = di.told.look(document.body);
+  const in_window = window === window.top; // a frame, as in a notebook, has no address to name
   let naming = 0;
 
   const there = { told: told !== null, path: looks.has_responses, bev: Boolean(bev), camera: Boolean(camera_map && front) };
@@ -119,7 +120,7 @@
     by_id("front-note").textContent = `looked at ${looks.time_s(i).toFixed(1)} s${peaks.length ? `; activation peaks: ${peaks.join(", ")}` : ""}`;
     if (told) tell_told(i);
     clearTimeout(naming);
-    if (!playing) naming = setTimeout(() => history.replaceState(null, "", `#t=${now.time_s.toFixed(2)}`), 400);
+    if (!playing && in_window) naming = setTimeout(() => history.replaceState(null, "", `#t=${now.time_s.toFixed(2)}`), 400);
   }
 
   function tell_told(i) {

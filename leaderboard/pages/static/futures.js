@@ -59,7 +59,7 @@
       caption.innerHTML = "<span></span><br><b></b><br><span></span>";
       caption.children[0].textContent = first;
       caption.children[2].textContent = `${ends}, score ${now.score.toFixed(1)}`;
-      caption.children[4].textContent = last ? `${last.time_s.toFixed(1)} s: ${last.text}` : "";
+      caption.children[4].textContent = last ? `${last.time_s} s: ${last.text}` : "";
     }
 
     function frame(now_ms) {
