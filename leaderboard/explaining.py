@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from leaderboard.asking import Asking
+from leaderboard.chosen_route import chosen_route
 from leaderboard.episode import close_agent
 from leaderboard.explanation import ExplainError, Explanation
 from leaderboard.futures import AHEAD_S
@@ -28,26 +29,6 @@ from leaderboard.timed_edits import decisions_before
 from leaderboard.what_if import read_questions
 
 EVERY_S = 0.2  # between two moments that are looked into
-
-
-def chosen_route(run: RunRecord, route_id: str, seed: int) -> RouteRecord:
-    """The record of a route and seed.
-
-    Raises:
-        ExplainError: If the run has none, or it was lost.
-    """
-    for record in run.routes:
-        if (record.route_id, record.seed) == (route_id, seed):
-            if record.lost:
-                raise ExplainError(
-                    f"route {route_id}, seed {seed} was lost to the machinery: {record.reason}"
-                )
-            return record
-    ids = ", ".join(dict.fromkeys(record.route_id for record in run.routes)) or "none yet"
-    seeds = ", ".join(map(str, run.seeds))
-    raise ExplainError(
-        f"the run has no route {route_id} with seed {seed}; its routes: {ids}; its seeds: {seeds}"
-    )
 
 
 def explain_route(
@@ -74,7 +55,8 @@ def explain_route(
         on_progress: Told how many decisions were made, and how many there are to make.
 
     Raises:
-        ExplainError: If there is no such route or moment.
+        RouteChoiceError: If the run has no such route, or it was lost.
+        ExplainError: If there is no such moment.
         EditError: If an edit cannot be read, or is of nothing that this agent has.
         ReplayError: If the route cannot be replayed here.
         RetraceError: If the agent does not drive it again here as it did.
@@ -83,12 +65,13 @@ def explain_route(
     if not isinstance(run, RunRecord):
         run = read_run(Path(run))
     record = chosen_route(run, str(route), seed)
-    if not every_s > 0.0:
-        raise ExplainError(f"every_s must be more than 0 s, not {every_s:g}")
+    for name, value_s in (("every_s", every_s), ("ahead_s", ahead_s)):
+        if not value_s > 0.0:
+            raise ExplainError(f"{name} must be more than 0 s, not {value_s:g}")
     env = retrace_env(run, front=True)
     at = _moment_number(record, at_s, what_if, env.config.control_dt_s)
     questions = read_questions(what_if, at_s or 0.0, run, env)
-    ahead = round(ahead_s / env.config.control_dt_s)
+    ahead = max(1, round(ahead_s / env.config.control_dt_s))
     steps = _Counted(record.steps + 1 + len(questions) * ahead, on_progress)
     agent = run_agent(run, env)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 from rich.console import Console
@@ -12,9 +12,6 @@ from rich.console import Console
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.work_bar import work_bar
-
-if TYPE_CHECKING:
-    from leaderboard.record import RouteRecord, RunRecord
 
 BRANCH_HELP = """Ask what would have happened: change the world at a moment of a recorded drive.
 
@@ -59,15 +56,16 @@ class Branch:
         """Branches; returns the exit code."""
         from di_envs.edit_text import EditError
         from di_envs.world_edits import read_world_edits
+        from leaderboard.chosen_route import RouteChoiceError, chosen_route
         from leaderboard.results import ResultsError, prepare_folder, read_run, write_run
 
         try:
             edits = read_world_edits(self.world)
             run = read_run(self.folder)
-            record = _chosen(run, self.route, self.seed)
+            record = chosen_route(run, self.route, self.seed)
             folder = self.output or self._new_folder()
             prepare_folder(folder, overwrite=self.overwrite)
-        except (EditError, ResultsError) as error:
+        except (EditError, ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
 
         from leaderboard.branch import BranchError, branch, branch_run, same_future
@@ -104,17 +102,3 @@ class Branch:
         while folder.exists():
             folder, number = self.folder / f"{name}-{number}", number + 1
         return folder
-
-
-def _chosen(run: RunRecord, route_id: str, seed: int) -> RouteRecord:
-    """The record of a route and seed."""
-    for record in run.routes:
-        if (record.route_id, record.seed) == (route_id, seed):
-            if record.lost:
-                raise UsageError(f"route {route_id}, seed {seed} was lost: {record.reason}")
-            return record
-    ids = ", ".join(dict.fromkeys(record.route_id for record in run.routes))
-    seeds = ", ".join(map(str, run.seeds))
-    raise UsageError(
-        f"the run has no route {route_id} with seed {seed}; its routes: {ids}; its seeds: {seeds}"
-    )

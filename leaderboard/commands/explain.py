@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -55,18 +56,24 @@ class Explain:
     every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 0.2
     """How often the agent is looked into, and a picture taken."""
 
+    agent: Annotated[str | None, says("AGENT", "the run's")] = None
+    """Where the agent is found now, if its weights have moved."""
+
     output: Annotated[Path | None, says("FILE", "explain-ROUTE.html in RUN")] = None
     """The page's file."""
 
     def run(self) -> int:
         """Writes the page; returns the exit code."""
+        from leaderboard.chosen_route import RouteChoiceError, chosen_route
         from leaderboard.results import ResultsError, read_run, run_folder
 
         try:
             folder = run_folder(self.folder)
             run = read_run(folder)
-        except ResultsError as error:
+            chosen_route(run, self.route, self.seed)
+        except (ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
+        run = dataclasses.replace(run, agent=self.agent or run.agent)
 
         from di_envs.edit_text import EditError
         from leaderboard.compiling import compile_progress

@@ -194,6 +194,9 @@ def test_the_command_writes_the_page_says_what_is_missing_and_names_the_next_ste
     assert '--at 0.3 --what-if "drop:routing; set:speed=0"' in said
     page = (tmp_path / f"explain-{route}.html").read_text(encoding="utf-8")
     assert "looked into" not in page.partition("<section")[0] or "note" in page
+    moved = ["--agent", "constant:throttle", "--output", str(tmp_path / "other.html")]
+    assert main(["explain", str(tmp_path), "--route", route, *moved]) == 2
+    assert "is not to be had here" in capsys.readouterr().err
     assert main(["explain", str(tmp_path), "--route", "nowhere"]) == 2
     assert "no route nowhere with seed 0" in capsys.readouterr().err
     assert main(["explain", str(tmp_path / "none"), "--route", route]) == 2

@@ -16,6 +16,7 @@ from agents.explain.look import look_at
 from di_envs.edit_text import EditError
 from di_envs.world_edits import read_world_edits
 from leaderboard.branch import branch, branch_run
+from leaderboard.chosen_route import RouteChoiceError
 from leaderboard.explaining import explain_route
 from leaderboard.explanation import ExplainError
 from leaderboard.pages.explain_tables import path_moves_m
@@ -190,11 +191,12 @@ def test_a_world_that_was_edited_later_is_edited_in_the_futures_too():
 @pytest.mark.parametrize(
     ("route", "asked", "error", "message"),
     [
-        ("77", {}, ExplainError, "no route 77 with seed 0; its routes: "),
-        (None, {"seed": 4}, ExplainError, "its seeds: 0"),
+        ("77", {}, RouteChoiceError, "no route 77 with seed 0; its routes: "),
+        (None, {"seed": 4}, RouteChoiceError, "its seeds: 0"),
         (None, {"at_s": 1.6}, ExplainError, "was driven to 1.6 s: .* between 0 and 1.5 s"),
         (None, {"at_s": -0.1}, ExplainError, "not -0.1 s"),
         (None, {"what_if": "drop:map"}, ExplainError, "say at which moment"),
+        (None, {"ahead_s": -1.0}, ExplainError, "ahead_s must be more than 0"),
         (None, {"every_s": 0.0}, ExplainError, "every_s must be more than 0"),
         (None, {"at_s": 1.0, "what_if": "drop"}, EditError, "cannot read the edit 'drop'"),
         (None, {"at_s": 1.0, "what_if": "dorp:map"}, EditError, "did you mean 'drop'"),
