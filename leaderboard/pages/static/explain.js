@@ -116,7 +116,7 @@
       const waypoints = there.path && shows("path") ? looks.waypoints(i) : null;
       front.show(i, { map, waypoints, look: colours });
     }
-    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toPrecision(2)}`);
+    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toExponential(1)}`);
     by_id("front-note").textContent = `looked at ${looks.time_s(i).toFixed(1)} s${peaks.length ? `; activation peaks: ${peaks.join(", ")}` : ""}`;
     if (told) tell_told(i);
     clearTimeout(naming);
