@@ -1,7 +1,7 @@
 # mypy: disallow_untyped_defs=False
-"""Steering along the path, and an acceleration turned into pedals, as kernels.
+"""Steering along the path, as a kernel.
 
-Both invert the ego's own model (`di_envs.world.dynamics`), so little is left to feedback.
+It inverts the ego's own model (`di_envs.world.dynamics`), so little is left to feedback.
 """
 
 from __future__ import annotations
@@ -39,17 +39,3 @@ def steering(path, progress, x, y, yaw, speed, model):
     wanted = curvature - drift / length - 2.0 * math.sin(turn) / length
     wheelbase = model.front_axle_m + model.rear_axle_m
     return min(max(math.atan(wanted * wheelbase) / model.steer_gain_rad, -1.0), 1.0)
-
-
-@kernel
-def pedals(acceleration, speed, model):
-    """Throttle and brake that give an acceleration [m/s²] at a speed; standing, the brake holds."""
-    if speed < 0.02 and acceleration <= 0.0:
-        return 0.0, 1.0
-    push = acceleration + model.drag_per_s * speed
-    if push <= 0.0:
-        return 0.0, min(-push / model.brake_mps2, 1.0)
-    push /= max(1.0 - speed / model.drive_fades_at_mps, 0.05)
-    square, linear = model.throttle_square_mps2, model.throttle_linear_mps2
-    throttle = (-linear + math.sqrt(linear * linear + 4.0 * square * push)) / (2.0 * square)
-    return min(throttle, 1.0), 0.0

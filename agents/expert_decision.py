@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.expert_actors import look
-from agents.expert_control import pedals, steering
+from agents.expert_control import steering
 from agents.expert_junction import crossing_acceleration, exit_acceleration, junction_ahead
 from agents.expert_line import Progress, localise
 from agents.expert_path import CHANGE_END_M, CHANGE_ROOM_M
@@ -21,6 +21,7 @@ from agents.expert_sight import (
 )
 from agents.expert_speed import cruise, forecast, stop_within
 from di_envs.kernels import kernel
+from di_envs.world.dynamics import pedals
 
 FORECAST_M = 100
 LONGEST_CHANGE_M = 45.0

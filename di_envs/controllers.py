@@ -1,10 +1,15 @@
 """Turns waypoints into controls with two PID controllers, as end-to-end drivers do.
 
-Source: Chen et al., Learning by Cheating, CoRL 2019, and Prakash et al., Multi-Modal Fusion
-Transformer for End-to-End Autonomous Driving (TransFuser), CVPR 2021, whose gains and aim point
-these are; DriveInsight (Li et al., 2024) sends its waypoints through the same. What we changed: the
-window of past errors is a value that is passed in and out, and waypoints are in our ego frame
-(x ahead, y right), so a positive angle steers right.
+Steering is that of Chen et al., Learning by Cheating, CoRL 2019, and Prakash et al., Multi-Modal
+Fusion Transformer for End-to-End Autonomous Driving (TransFuser), CVPR 2021: its gains, its aim
+point; DriveInsight (Li et al., 2024) sends its waypoints through the same. What we changed: the
+window of past errors is a value that is passed in and out, and waypoints are in our ego frame (x
+ahead, y right; a positive angle steers right).
+
+Speed is not theirs. They brake fully or not at all, for the speed that is planned between 0.5 and
+1 s ahead, so a car slows down half a second early and creeps up to each stop line, now at 0.2 and
+now at 1.2 m/s, which policies took for having stopped. Here a controller says how hard to brake or
+to gain speed, and the ego's own model says with which pedals.
 """
 
 from __future__ import annotations
@@ -14,6 +19,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from di_envs.world.dynamics import EgoModel, pedals
 
 Control = NDArray[np.float32]  # (3,) throttle 0..1, steer -1..1 (positive right), brake 0..1
 
@@ -47,28 +54,36 @@ def pid_step(gains: PIDGains, errors: Errors, error: float) -> tuple[float, Erro
 
 @dataclass(frozen=True, kw_only=True)
 class WaypointControllerConfig:
-    """How waypoints become controls; the defaults are TransFuser's."""
+    """How waypoints become controls.
 
-    waypoint_dt_s: float = 0.5  # time between waypoints
+    Attributes:
+        waypoint_dt_s: Time between waypoints.
+        turn: From the bearing of the aim, as a share of a quarter turn, to the wheel -1..1.
+        speed: From the error of the mean speed up to the first waypoint [m/s] to an acceleration
+            [m/s²]. A car that gains speed evenly is off by half of what it gains over that time, so
+            `2 / waypoint_dt_s` is the gain with which it does what was planned.
+        hold_mps: Planned to be slower than this up to the second waypoint, it is brought to stand.
+        hold_mps2: … with at least this deceleration.
+        min_turn_speed_mps: Below it the wheel is kept straight.
+        model: Of the car whose pedals these are.
+    """
+
+    waypoint_dt_s: float = 0.5
     turn: PIDGains = field(
         default_factory=lambda: PIDGains(proportional=1.25, integral=0.75, derivative=0.3)
     )
     speed: PIDGains = field(
-        default_factory=lambda: PIDGains(proportional=5.0, integral=0.5, derivative=1.0)
+        default_factory=lambda: PIDGains(proportional=4.0, integral=0.0, derivative=0.0)
     )
-    max_throttle: float = 0.75
-    brake_speed_mps: float = 0.4  # brakes when it should drive slower than this
-    brake_ratio: float = 1.1  # brakes when it is this much faster than it should be
-    clip_delta_mps: float = 0.25  # greatest speed error that the controller sees
-    min_turn_speed_mps: float = 0.01  # below it the wheel is kept straight
+    hold_mps: float = 0.6
+    hold_mps2: float = 1.0
+    min_turn_speed_mps: float = 0.01
+    model: EgoModel = field(default_factory=EgoModel)
 
     def __post_init__(self) -> None:
-        if not self.waypoint_dt_s > 0.0:
-            raise ValueError(f"waypoint_dt_s must be positive, not {self.waypoint_dt_s}")
-        if not 0.0 <= self.max_throttle <= 1.0:
-            raise ValueError(f"max_throttle must lie in [0, 1], not {self.max_throttle}")
-        if not self.brake_ratio >= 1.0:
-            raise ValueError(f"brake_ratio must be at least 1, not {self.brake_ratio}")
+        for name in ("waypoint_dt_s", "hold_mps2"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +100,7 @@ def waypoints_to_control(
     memory: ControllerMemory,
     config: WaypointControllerConfig,
 ) -> tuple[Control, ControllerMemory]:
-    """The control that follows waypoints: speed from their spacing, steering from their middle.
+    """The control that follows waypoints: their first one in time, the wheel by the first two.
 
     Args:
         waypoints: (T, 2) future positions x, y at equal times, ego frame [m]; T at least 2.
@@ -105,17 +120,17 @@ def waypoints_to_control(
     if not (np.isfinite(points).all() and math.isfinite(speed_mps)):
         raise ValueError("waypoints and speed must be finite")
     (x0, y0), (x1, y1) = points[0], points[1]
-    desired_mps = math.hypot(x1 - x0, y1 - y0) / config.waypoint_dt_s
-    brake = desired_mps < config.brake_speed_mps or speed_mps > config.brake_ratio * desired_mps
-    delta = min(max(desired_mps - speed_mps, 0.0), config.clip_delta_mps)
-    pedal, speed_errors = pid_step(config.speed, memory.speed, delta)
-    throttle = 0.0 if brake else min(max(pedal, 0.0), config.max_throttle)
+    planned_mps = math.hypot(x0, y0) / config.waypoint_dt_s
+    wanted_mps2, speed_errors = pid_step(config.speed, memory.speed, planned_mps - speed_mps)
+    if math.hypot(x1, y1) < 2.0 * config.waypoint_dt_s * config.hold_mps:
+        wanted_mps2 = min(wanted_mps2, -config.hold_mps2)
+    throttle, brake = pedals(wanted_mps2, speed_mps, config.model.parameters())
     # A full turn of the wheel stands for a quarter turn of the aim.
     angle = math.atan2(0.5 * (y0 + y1), 0.5 * (x0 + x1)) / (0.5 * math.pi)
     if speed_mps < config.min_turn_speed_mps:
         angle = 0.0
     steer, turn_errors = pid_step(config.turn, memory.turn, angle)
     return (
-        np.array([throttle, min(max(steer, -1.0), 1.0), float(brake)], np.float32),
+        np.array([throttle, min(max(steer, -1.0), 1.0), brake], np.float32),
         ControllerMemory(turn=turn_errors, speed=speed_errors),
     )

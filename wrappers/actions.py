@@ -42,9 +42,9 @@ def pedal_vector(envs: VectorEnv[Any, Any, Any]) -> TransformAction:
 class WaypointWrapper(gymnasium.ActionWrapper[Observation, Action, Action]):
     """Takes where the ego should be in 0.5 s, 1 s, … 4 s, and steers it there by two PIDs.
 
-    The action is (8, 2): x ahead, y right [m], in the ego's frame of the moment. The controller is
-    TransFuser's (`di_envs.controllers`); it looks at the first two points. Its past errors and the
-    speed that it last saw are what `di_envs.save` keeps of this wrapper.
+    The action is (8, 2): x ahead, y right [m], in the ego's frame of the moment. The controllers
+    (`di_envs.controllers`) look at the first two points. Their past errors and the speed that they
+    last saw are what `di_envs.save` keeps of this wrapper.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class WaypointWrapper(gymnasium.ActionWrapper[Observation, Action, Action]):
 
         Args:
             env: An environment with the observation group `prompt` or `inertial`.
-            config: The controller's gains and limits; None takes TransFuser's.
+            config: The controllers' gains and limits; None takes the policy's own.
 
         Raises:
             ValueError: If there is no such speed, or the points' spacing is not 0.5 s.

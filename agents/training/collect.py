@@ -128,6 +128,7 @@ def collect(
     frames: int,
     *,
     driver: str = EXPERT,
+    first: int = 0,
     workers: int = 1,
     pool: AbstractContextManager[Pool] | None = None,
 ) -> Generator[Outcome, None, None]:
@@ -140,6 +141,7 @@ def collect(
         towns: Names of training towns.
         frames: Moments in all.
         driver: See `DriveJob`.
+        first: Number of each town's first drive.
         workers: Drives at the same time.
         pool: Where; None for processes of this machine.
 
@@ -151,7 +153,7 @@ def collect(
         for town in towns:
             jobs = (
                 DriveJob(folder=folder, town=town, number=number, driver=driver)
-                for number in range(10**6)
+                for number in range(first, first + 10**6)
             )
             yield from _collect_town(drivers, jobs, share, workers)
 

@@ -160,7 +160,7 @@ class Training:
         mixed = self.config.precision == "bfloat16"
         output, targets = look(self.policy, batch, hidden, mixed=mixed)
         terms = losses(output, targets, self.config.loss)
-        return self.team.weighted(terms, counts(targets))
+        return self.team.weighted(terms, counts(targets, self.config.loss))
 
     def _diverged(self, what: str) -> TrainingError:
         return TrainingError(

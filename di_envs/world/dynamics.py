@@ -91,6 +91,23 @@ def longitudinal_acceleration(speed_mps, throttle, brake, model):
 
 
 @kernel
+def pedals(acceleration, speed, model):
+    """Throttle and brake that give an acceleration [m/s²] at a speed; standing, the brake holds.
+
+    The inverse of `longitudinal_acceleration`, as far as the engine and the brakes go.
+    """
+    if speed < 0.02 and acceleration <= 0.0:
+        return 0.0, 1.0
+    push = acceleration + model.drag_per_s * speed
+    if push <= 0.0:
+        return 0.0, min(-push / model.brake_mps2, 1.0)
+    push /= max(1.0 - speed / model.drive_fades_at_mps, 0.05)
+    square, linear = model.throttle_square_mps2, model.throttle_linear_mps2
+    throttle = (-linear + math.sqrt(linear * linear + 4.0 * square * push)) / (2.0 * square)
+    return min(throttle, 1.0), 0.0
+
+
+@kernel
 def move_ego(state, ego, model):
     """Advances one ego by a tick under its held controls, plus the noise of a loss of control.
 

@@ -56,6 +56,10 @@ class Collect:
     """Who drives. With another agent, such as driveinsight:runs/small/policy, what is kept is what
     the expert would have done from each moment of its drives: corrections of its mistakes."""
 
+    first: Annotated[int, says("N", "0")] = 0
+    """Number of each town's first drive; it says route and seed. Begin where earlier drives ended,
+    and a learner is corrected in places that it has not been trained on."""
+
     output: Annotated[Path, says("DIR", "data")] = Path("data")
     """Folder for the drives of this driver."""
 
@@ -63,6 +67,8 @@ class Collect:
         """Collects; returns the exit code."""
         if self.frames < 1 or self.workers < 1:
             raise UsageError("--frames and --workers must be at least 1")
+        if self.first < 0:
+            raise UsageError("--first must not be negative")
         if self.address and self.engine != "ray":
             raise UsageError("--address is of a Ray cluster: add --engine ray")
 
@@ -119,6 +125,7 @@ class Collect:
             towns,
             self.frames,
             driver=self.driver,
+            first=self.first,
             workers=self.workers,
             pool=self._pool(),
         )

@@ -22,12 +22,11 @@ from straight_road import (
 )
 
 from agents.expert_actors import PULL_OUT_M
-from agents.expert_control import pedals
 from agents.expert_line import Progress, shift_at
 from agents.expert_path import CHANGE_ROOM_M
 from agents.expert_speed import NO_LIMIT_MPS2, follow, forecast, stop_within, time_to
 from di_envs.town.lanes import LightState, SignalKind
-from di_envs.world.dynamics import longitudinal_acceleration
+from di_envs.world.dynamics import longitudinal_acceleration, pedals
 from di_envs.world.state import ActorKind
 
 NUMBERS = CONFIG.numbers()

@@ -10,13 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from headless_browser import browser_page, find_browser
 from short_drives import short_run
+from untrained import save_untrained
 
-from agents.driveinsight.config import config_named
-from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
 from leaderboard.cli import main
 from leaderboard.explaining import explain_route
 from leaderboard.pages.blocks import read_block
@@ -32,8 +29,7 @@ TABLES = {"routing": 2, "obstacles": 8, "traffic_lights": 4, "stop_signs": 3}  #
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
-    torch.manual_seed(0)
-    save_pretrained(Policy(config_named("tiny")), folder, "")
+    save_untrained(folder, "tiny")
     return short_run(f"driveinsight:{folder}", DECISIONS, interventions=("drop:map@t>1",), **BUSY)
 
 

@@ -6,12 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-import torch
 from short_drives import short_run
+from untrained import save_untrained
 
-from agents.driveinsight.config import config_named
-from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
 from agents.explain.look import look_at
 from di_envs.edit_text import EditError
 from di_envs.world_edits import read_world_edits
@@ -57,8 +54,7 @@ class Hiding:
 def run(tmp_path_factory):
     """The start of a drive with an untrained policy that has a camera and BEV features."""
     folder = tmp_path_factory.mktemp("policy")
-    torch.manual_seed(0)
-    save_pretrained(Policy(config_named("tiny")), folder, "")
+    save_untrained(folder, "tiny")
     return short_run(f"driveinsight:{folder}", DECISIONS, **BUSY)
 
 
@@ -214,8 +210,7 @@ def test_a_run_of_another_town_or_other_weights_is_refused(run, tmp_path):
     elsewhere = dataclasses.replace(run, town_hash="00")
     with pytest.raises(ReplayError, match="driven in a town with hash 00"):
         explain_route(elsewhere, run.routes[0].route_id)
-    torch.manual_seed(1)
-    save_pretrained(Policy(config_named("tiny")), tmp_path, "")
+    save_untrained(tmp_path, "tiny", seed=1)
     other = dataclasses.replace(run, agent=f"driveinsight:{tmp_path}")
     with pytest.raises(RetraceError, match="acts otherwise than recorded: the code or the weights"):
         explain_route(other, run.routes[0].route_id)

@@ -6,13 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-import torch
 from short_drives import short_run
+from untrained import save_untrained
 
 from agents import load_agent
-from agents.driveinsight.config import config_named
-from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
 from di_envs import restore, save
 from leaderboard.packing import pack
 from leaderboard.record import CHECK_TYPE, CONTROL_TYPE
@@ -26,8 +23,7 @@ BUSY = {"traffic": 8, "walkers": 4}
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
-    torch.manual_seed(0)
-    save_pretrained(Policy(config_named("small-prompt-only")), folder, "")
+    save_untrained(folder, "small-prompt-only")
     return folder
 
 
@@ -79,8 +75,7 @@ def test_the_caller_may_drive_elsewhere_between_two_decisions_and_come_back(run)
 
 
 def test_other_weights_are_noticed_at_the_first_other_decision_and_named(run, weights, tmp_path):
-    torch.manual_seed(1)
-    save_pretrained(Policy(config_named("small-prompt-only")), tmp_path, "")
+    save_untrained(tmp_path, "small-prompt-only", seed=1)
     other = dataclasses.replace(run, agent=f"driveinsight:{tmp_path}")
     with pytest.raises(RetraceError, match=r"at 0(\.1)? s the agent acts otherwise.*the weights"):
         list(retrace(other, run.routes[0]))

@@ -156,6 +156,24 @@ def test_missing_waypoints_of_a_drive_that_ended_cost_nothing(small):
     assert torch.equal(first, second)
 
 
+def test_near_waypoints_weigh_more_than_far_ones(small):
+    with torch.inference_mode():
+        output = small(random_inputs(small.config))
+    targets = random_targets(output)
+    aligned = dataclasses.replace(targets, waypoints=output.waypoints.clone())
+    loss = {}
+    for k in (0, 7):
+        wrong = dataclasses.replace(aligned, waypoints=aligned.waypoints.clone())
+        wrong.waypoints[:, k, 0] += 1.0
+        for nearness in (0.0, 1.0):
+            terms = losses(output, wrong, LossConfig(nearness=nearness))
+            loss[k, nearness] = float(terms["waypoints"])
+    assert loss[0, 0.0] == pytest.approx(loss[7, 0.0]) == pytest.approx(1.0 / 8.0)
+    whole = sum(1.0 / k for k in range(1, 9))
+    assert loss[0, 1.0] == pytest.approx(1.0 / whole)
+    assert loss[7, 1.0] == pytest.approx(1.0 / 8.0 / whole)
+
+
 def test_taps_are_named_by_their_place_and_can_be_edited(small):
     names = tap_names(small)
     assert {"camera.depth", "lidar.bev", "fusion.bev", "memory.bev", "waypoints"} <= set(names)

@@ -169,6 +169,11 @@ def test_collecting_gives_the_same_files_stopped_or_not_with_one_process_or_two(
     outcomes = list(collect(again, ["small_grid"], 400, workers=1))
     assert outcomes[0] == dataclasses.replace(first, fresh=False)
     assert files_of(once) == files_of(again)
+    later = [
+        outcome.job.number for outcome in collect(tmp_path / "later", ["small_grid"], 1, first=1)
+    ]
+    assert later == [1]
+    assert files_of(tmp_path / "later").items() <= files_of(once).items()
     card = data_card(once)
     assert card["moments"] == sum(outcome.moments for outcome in outcomes) >= 400
     assert card["by_town"] == {"small_grid": card["moments"]}
