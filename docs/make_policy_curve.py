@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from agents.training.train_log import HELD_OUT, read_rows
-from agents.training.training import LOG_FILE
+from agents.training.training_loop import LOG_FILE
 
 OUT = Path(__file__).parent / "images" / "policy-training.png"
 

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from agents.training.distributed import Team
     from agents.training.loading import Moments
     from agents.training.train_config import TrainConfig
-    from agents.training.training import Checks, Training
+    from agents.training.training import Training
+    from agents.training.training_loop import Checks
     from leaderboard.training_display import TrainingDisplay
 
 TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
@@ -169,7 +170,7 @@ class Train:
     def _train(self, training: Training, moments: Moments) -> int:
         from agents.training.collect import data_card
         from agents.training.loading import Samples, batches
-        from agents.training.training import train
+        from agents.training.training_loop import train
         from leaderboard.compiling import compile_progress
         from leaderboard.interruption import interruptible
         from leaderboard.training_display import TrainingDisplay
@@ -205,7 +206,7 @@ class Train:
     def _go_on(self, training: Training, folder: Path) -> None:
         """Goes on with the training that the folder holds, or with another policy's weights."""
         from agents.driveinsight.weights import take_weights
-        from agents.training.training import CHECKPOINT_FILE
+        from agents.training.training_loop import CHECKPOINT_FILE
 
         if (folder / CHECKPOINT_FILE).exists():
             training.load(folder / CHECKPOINT_FILE)
@@ -239,7 +240,7 @@ class Train:
     def _checks(
         self, training: Training, show: TrainingDisplay, stop: Callable[[], bool]
     ) -> Iterator[Checks | None]:
-        from agents.training.training import Checks
+        from agents.training.training_loop import Checks
         from leaderboard.training_check import ClosedLoopCheck
 
         if not self.check_routes or self.overfit or not training.team.first:
@@ -297,7 +298,7 @@ def _tell_stopped(training: Training) -> int:
 
 def _tell(training: Training, folder: Path) -> int:
     from agents.training.train_log import HELD_OUT, read_rows, write_curve
-    from agents.training.training import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
+    from agents.training.training_loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     log, checked = read_rows(folder / LOG_FILE), read_rows(folder / CHECKS_FILE)
     curve = folder / "curve.png"

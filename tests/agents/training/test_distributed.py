@@ -16,7 +16,8 @@ from small_policies import PROMPT_ONLY
 from agents.training.distributed import ALONE, Team, joined_team
 from agents.training.loading import Samples, batches, load_moments, order
 from agents.training.train_config import TrainConfig
-from agents.training.training import CHECKPOINT_FILE, Training, train
+from agents.training.training import Training
+from agents.training.training_loop import CHECKPOINT_FILE, train
 
 TWO = TrainConfig(steps=6, batch=4, warm_up=2, processes=2, held_out=0.5)
 

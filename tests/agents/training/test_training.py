@@ -21,17 +21,17 @@ from agents.driveinsight.weights import (
 from agents.training.collect import drive_paths
 from agents.training.frames import DriveFileError, read_drive
 from agents.training.loading import Samples, batches, load_moments
+from agents.training.look import look
 from agents.training.samples import batch_of, hidden_components
 from agents.training.train_config import TrainConfig, TrainingError
 from agents.training.train_log import HELD_OUT, forget_rows_after, read_rows, write_curve
-from agents.training.training import (
+from agents.training.training import Training
+from agents.training.training_loop import (
     CHECKPOINT_FILE,
     CHECKS_FILE,
     LOG_FILE,
     POLICY_FOLDER,
     Checks,
-    Training,
-    look,
     train,
 )
 from agents.training.waypoints import expert_waypoints
