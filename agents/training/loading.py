@@ -6,7 +6,9 @@ any number of processes, and a run that was killed goes on with the batch that i
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import os
 import signal
 import zlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -263,5 +265,10 @@ def batches(
 
 
 def _begin_worker(_: int) -> None:
-    """Ctrl-C is for the process that trains: it stops its workers when it has saved."""
+    """Ctrl-C is for the process that trains: it stops its workers when it has saved.
+
+    A worker leaves without tidying its interpreter up: torch may still be sending a batch that
+    nobody waits for any more, and a thread that is ended in there aborts the process.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    atexit.register(os._exit, 0)
