@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import gymnasium
@@ -185,6 +186,34 @@ def test_noise_has_its_spread_and_moves_only_what_is_there(seen):
     assert not moved[~there].any()
     assert not moved[..., 2:].any()
     assert moved[there][:, :2].std() == pytest.approx(0.5, abs=0.05)
+
+
+def test_noise_on_an_image_is_normal_number_by_number_and_anew_in_each_world():
+    grey = np.full(SPACE["camera_front"].shape, 128, np.uint8)
+    editing = ObservationEditing("noise:camera_front,sigma=8", SPACE)
+    contexts = [moment(seed=5), moment(seed=6)]
+    alone = [
+        editing.apply({"camera_front": grey}, context, editing.start())[0]["camera_front"]
+        for context in contexts
+    ]
+    moved = alone[0].astype(np.float64) - 128.0
+    assert moved.mean() == pytest.approx(0.0, abs=0.1)
+    assert moved.std() == pytest.approx(8.0, abs=0.1)
+    assert (np.abs(moved) <= 8.0).mean() == pytest.approx(0.712, abs=0.01)  # Phi(8.5/8), both sides
+    flat = moved.ravel()
+    for apart in (1, 2, 3, grey.shape[1] * 3):
+        assert abs(np.corrcoef(flat[:-apart], flat[apart:])[0, 1]) < 0.02
+    assert abs(np.corrcoef(flat, alone[1].ravel())[0, 1]) < 0.02
+
+    both = EditContext(
+        **{
+            part.name: np.array([getattr(context, part.name) for context in contexts])
+            for part in dataclasses.fields(EditContext)
+        }
+    )
+    seen = {"camera_front": np.stack([grey, grey])}
+    together, _ = editing.apply(seen, both, editing.start())
+    assert np.array_equal(together["camera_front"], np.stack(alone))
 
 
 def test_the_share_that_is_lost_is_the_one_that_was_asked_for(seen):

@@ -14,6 +14,7 @@ An edit of one's own is a dataclass with a verb, settings, and `edited`:
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field
 from functools import cache
@@ -81,6 +82,14 @@ class Draws:
     def normals(self, *shape: int) -> NDArray[np.float64]:
         """(..., *shape) standard normal."""
         return self._drawn(keyed_normals, shape)
+
+    def words(self, *shape: int) -> NDArray[np.uint16]:
+        """(..., *shape) whole numbers below 65536: three of each draw, for very many of them."""
+        count = math.prod(shape)
+        drawn = self.uniforms(-(-count // 3))
+        words = (drawn * 2.0**48).astype("<u8").view("<u2")
+        threes = words.reshape(*drawn.shape, 4)[..., :3].reshape(*drawn.shape[:-1], -1)
+        return threes[..., :count].reshape(*drawn.shape[:-1], *shape)
 
     def _drawn(
         self, draw: Callable[..., NDArray[np.float64]], shape: tuple[int, ...]
