@@ -12,7 +12,16 @@ import numpy as np
 from di_envs.world.kinds import EventKind
 from leaderboard.rules import rules_named
 from leaderboard.score import infractions_per_km
-from leaderboard.studies.effects import ALPHA, EQUIVALENT, Effect, effect, interval, spearman
+from leaderboard.studies.effects import (
+    ALPHA,
+    EQUIVALENT,
+    MARGIN_DS,
+    MATTERS,
+    Effect,
+    effect,
+    interval,
+    spearman,
+)
 from leaderboard.studies.record import Drive, DrivenRow, Study
 from leaderboard.studies.rows import NULL, WAYS
 from leaderboard.studies.study_error import StudyError
@@ -58,10 +67,18 @@ class RowFinding:
         return None if row is None else row.difference
 
     @property
-    def differs_from_paper(self) -> bool:
+    def judged_otherwise_in_paper(self) -> bool:
         """Whether both have a verdict, and not the same one."""
         row = TABLE_2.get(self.driven.row.component)
-        return row is not None and {self.verdict, row.verdict} == {"matters", "equivalent"}
+        return row is not None and {self.verdict, row.verdict} == {MATTERS, EQUIVALENT}
+
+    @property
+    def outside(self) -> bool:
+        """Whether the paper's difference is not in the interval, nor near what was found."""
+        there, found = self.paper_difference, self.difference
+        if there is None or found.low is None or found.high is None:
+            return False
+        return not found.low <= there <= found.high and abs(there - found.mean) > MARGIN_DS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,18 +242,22 @@ def sentences(ablation: Ablation) -> list[str]:
     """One sentence for each row on which the paper and this study differ."""
     found = []
     for row in ablation.rows:
-        paper = TABLE_2.get(row.driven.row.component)
-        if paper is None or not row.differs_from_paper:
-            continue
-        ours = row.difference
-        here = f"{ours.mean:+.1f} DS, {_span(ours)}"
-        there = f"{paper.difference:+.1f} in the paper"
-        name = row.driven.row.edit
-        if row.verdict == EQUIVALENT:
-            found.append(f"{name} makes no difference here ({here}), but {there}.")
-        else:
-            found.append(f"{name} matters here ({here}), but hardly there ({there}).")
+        if row.judged_otherwise_in_paper or row.outside:
+            here = f"{row.difference.mean:+.1f} DS, {_span(row.difference)}"
+            there = f"{row.paper_difference:+.1f} there"
+            found.append(f"{row.driven.row.edit} {_differs(row)} ({here}; {there}).")
     return found
+
+
+def _differs(row: RowFinding) -> str:
+    """What a row does here, and what in the paper."""
+    if row.judged_otherwise_in_paper:
+        if row.verdict == EQUIVALENT:
+            return "makes no difference here, but does in the paper"
+        return "matters here, but hardly in the paper"
+    if row.difference.mean < (row.paper_difference or 0.0):
+        return "costs more here than in the paper"
+    return "costs less here than in the paper"
 
 
 def _span(found: Effect) -> str:

@@ -67,10 +67,24 @@ def test_pairs_are_worlds_that_both_drove():
 
 def test_a_sentence_is_said_where_the_paper_differs_and_only_there(made):
     said = sentences(work_out(made))
-    assert len(said) == 2
-    assert said[0].startswith("drop:map matters here (-40.5 DS")
-    assert "hardly there (-0.8 in the paper)" in said[0]
-    assert said[1].startswith("drop:routing makes no difference here (-0.5 DS")
+    assert len(said) == 3
+    assert said[0].startswith("drop:map matters here, but hardly in the paper (-40.5 DS")
+    assert said[0].endswith("; -0.8 there).")
+    assert said[1].startswith("drop:routing makes no difference here, but does in the paper (-0.5")
+    assert said[2].startswith("drop:traffic_lights costs more here than in the paper (-60.5 DS")
+
+
+@pytest.mark.parametrize(
+    ("name", "by", "says"),
+    [
+        ("drop-routing", 40.0, ["drop:routing costs less here than in the paper"]),
+        ("drop-speed", 40.0, ["drop:speed costs more here than in the paper"]),
+        ("drop-target_point", 62.0, []),  # 62.66 there
+    ],
+)
+def test_a_row_of_the_same_verdict_differs_where_the_interval_leaves_the_paper_out(name, by, says):
+    said = sentences(work_out(study(BASELINE, NULL, fallen(name, by))))
+    assert [line.partition(" (")[0] for line in said] == says
 
 
 def test_the_papers_differences_are_those_of_its_table():
