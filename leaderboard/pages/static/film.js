@@ -3,6 +3,7 @@
 //
 // const film = di.film.of(await di.blocks.read(text))
 // film.end_s, film.at(time_s) -> {time_s, moment, ego, actors, lights, control, score, ...}
+// di.film.kmh(metres_a_second): as people read it
 
 (function (di) {
   const ABOVE = 1, BRAKES = 2, LEFT = 4, RIGHT = 8; // bits of an actor's flags
@@ -140,5 +141,10 @@
     return low;
   }
 
-  di.film = { of, ABOVE, BRAKES, LEFT, RIGHT };
+  function kmh(speed) {
+    const tenths = Math.round(36 * speed) || 0; // who stands may roll back by a hair: not -0.0
+    return `${(tenths / 10).toFixed(1)} km/h`;
+  }
+
+  di.film = { of, kmh, ABOVE, BRAKES, LEFT, RIGHT };
 })((globalThis.driveinsight ??= {}));

@@ -55,7 +55,7 @@
       const [throttle, steer, brake] = answer.control ?? [];
       const first = answer.control === null ? "the agent fails" : `throttle ${throttle.toFixed(2)} · steer ${steer.toFixed(2)} · brake ${brake.toFixed(2)}`;
       const last = answer.events.filter((event) => event.time_s <= time_s + 0.01).at(-1);
-      const ends = over ? `over at ${film.end_s.toFixed(1)} s${answer.status ? `: ${answer.status}` : ""}` : `${(3.6 * now.ego.speed).toFixed(1)} km/h`;
+      const ends = over ? `over at ${film.end_s.toFixed(1)} s${answer.status ? `: ${answer.status}` : ""}` : di.film.kmh(now.ego.speed);
       caption.innerHTML = "<span></span><br><b></b><br><span></span>";
       caption.children[0].textContent = first;
       caption.children[2].textContent = `${ends}, score ${now.score.toFixed(1)}`;

@@ -116,7 +116,7 @@
           obstacles: String(count("obstacles")),
           traffic_lights: lights.length ? STATES.map((state) => [lights.filter((one) => one === state).length, state]).filter(([n]) => n).map(([n, state]) => `${n} ${state}`).join(", ") : "0",
           stop_signs: String(count("stop_signs")),
-          speed: `${(3.6 * columns.speed[i]).toFixed(1)} km/h`,
+          speed: di.film.kmh(columns.speed[i]),
         };
         return Object.entries(text).map(([name, value]) => ({ name, text: value, given: given(i, name) }));
       },

@@ -101,7 +101,7 @@
 
   function tell_now(now) {
     by_id("now-time").textContent = `${now.time_s.toFixed(1)} s`;
-    by_id("now-speed").textContent = `${(3.6 * now.ego.speed).toFixed(1)} km/h`;
+    by_id("now-speed").textContent = di.film.kmh(now.ego.speed);
     by_id("now-done").textContent = `${now.completion.toFixed(1)} %`;
     by_id("now-score").textContent = now.score.toFixed(1);
     bar("throttle", now.throttle, false);
