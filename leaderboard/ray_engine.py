@@ -244,12 +244,18 @@ def _own_cluster(workers: int) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def cluster(workers: int, address: str | None) -> Generator[Any]:
-    """Ray, connected for as long as this lasts; see `RayEngine` for what it is told."""
+    """Ray, connected for as long as this lasts; see `RayEngine` for what it is told.
+
+    Within another, it is that one's connection.
+    """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray asks nothing else, as it loads
     try:
         import ray
     except ImportError as error:
         raise SetupError(WITHOUT_RAY) from error
+    if ray.is_initialized():
+        yield ray
+        return
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     local = {} if address else _own_cluster(workers)
     try:

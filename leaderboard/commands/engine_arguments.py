@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -45,6 +46,14 @@ class EngineArguments:
             raise UsageError("--workers must be at least 1")
         if self.address and self.engine != "ray":
             raise UsageError("--address is of a Ray cluster: add --engine ray")
+
+    def connected(self) -> AbstractContextManager[object]:
+        """What keeps an engine's connection over several runs: a cluster starts but once."""
+        if self.engine == "local":
+            return nullcontext()
+        from leaderboard.ray_engine import cluster
+
+        return cluster(self.workers, self.address)
 
     def make_engine(self) -> Engine:
         """The engine that the arguments describe.

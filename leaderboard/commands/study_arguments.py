@@ -94,13 +94,15 @@ class StudyArguments(EngineArguments, SceneArguments):
         spec = RunSpec(
             agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
         )
-        study, interrupted = drive_study(
-            StudyPlan(kind=self.kind(), spec=spec, suite=suite, rows=rows),
-            self.seeds,
-            folder=folder,
-            engine=self.make_engine(),
-            keep=lambda so_far: keep_study(folder, so_far),
-        )
+        engine = self.make_engine()
+        with self.connected():
+            study, interrupted = drive_study(
+                StudyPlan(kind=self.kind(), spec=spec, suite=suite, rows=rows),
+                self.seeds,
+                folder=folder,
+                engine=engine,
+                keep=lambda so_far: keep_study(folder, so_far),
+            )
         if not interrupted:
             try:
                 study = self.measured(study, folder)

@@ -24,9 +24,11 @@ from leaderboard.ray_engine import RayEngine, check_footing
 from leaderboard.record import RunRecord
 from leaderboard.runner import evaluate
 from leaderboard.setting_up import scene_of, set_up
+from leaderboard.studies.study_file import read_study
 from leaderboard.wall_clock import Stopwatch
 
 MISBEHAVING = Path(__file__).with_name("misbehaving.py")
+FOLLOWER = f"{Path(__file__).parents[2] / 'examples' / 'your_own_agent.py'}:RouteFollower"
 TOY = load_suite("toy")
 ROUTE = TOY.specs()[0].route_id
 OPTIONS = {"suite": "toy", "traffic": 8, "walkers": 4, "route_ids": (ROUTE,)}
@@ -92,6 +94,29 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     run = evaluated(spec, [2, *range(10, 40)], tmp_path / "run", said)
     assert 1 <= len(run.routes) < run.planned == 31
     assert "interrupted: " in said.getvalue()
+
+
+@cluster
+def test_a_study_has_the_same_drives_and_starts_one_cluster_for_all_its_rows(tmp_path, monkeypatch):
+    import ray
+
+    start, starts = ray.init, []
+    monkeypatch.setattr(ray, "init", lambda **options: (starts.append(options), start(**options)))
+    study = ["ablate", "--agent", FOLLOWER, "--suite", "toy", "--traffic", "8"]
+    study += ["--walkers", "4", "--route-ids", ROUTE, "--rows", "zero-routing"]
+    assert main([*study, "--output", str(tmp_path / "here")]) == 0
+    assert main([*study, "--engine", "ray", "--output", str(tmp_path / "there")]) == 0
+    assert len(starts) == 1
+    here, there = (
+        [
+            [dataclasses.replace(drive, wall_s=0.0) for drive in driven.drives]
+            for driven in read_study(tmp_path / name).rows
+        ]
+        for name in ("here", "there")
+    )
+    assert here == there
+    assert len(here) == 3
+    assert here[0] != here[2]  # the edit does something
 
 
 @pytest.fixture(scope="module")
