@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
+from agents.one_thread import one_thread
 from leaderboard.episode import close_agent
 from leaderboard.record import RouteRecord
 from leaderboard.results import read_run, replace_file
@@ -112,7 +113,7 @@ def ask_about(folder: Path, index: int) -> None:
         for decision in retrace(run, record, agent=agent, env=env):
             if decision.control is None or decision.number % EVERY:
                 continue
-            with torch.no_grad():
+            with one_thread(), torch.no_grad():
                 lengths = [path_length(policy.waypoints(decision.seen, decision.memory).numpy())]
                 for editing in edits.values():
                     seen, _ = editing.apply(decision.seen, decision.context, editing.start())
