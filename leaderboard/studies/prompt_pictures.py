@@ -86,7 +86,7 @@ def _draw_lights(axes: Any, numbers: Mapping[str, Any]) -> None:
     _names(axes, [*names.values()])
     axes.set_xlim(-5.0, 105.0)
     axes.set_xlabel("percent of the lights met")
-    axes.legend(frameon=False, fontsize=8)
+    _legend_beside(axes)
 
 
 def _draw_failures(axes: Any, numbers: Mapping[str, Any]) -> None:
@@ -104,7 +104,12 @@ def _draw_failures(axes: Any, numbers: Mapping[str, Any]) -> None:
     low, high = axes.get_xlim()
     axes.set_xlim(min(low, -10.0), max(high, 10.0))
     axes.set_xlabel("how many more drives, in percent of all")
-    axes.legend(frameon=False, fontsize=8)
+    _legend_beside(axes)
+
+
+def _legend_beside(axes: Any) -> None:
+    """Intervals may reach across all of the picture."""
+    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _dot(axes: Any, found: Mapping[str, Any], place: float, colour: str, label: str | None) -> None:
