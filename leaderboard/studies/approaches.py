@@ -3,7 +3,8 @@
 A light is met once the ego comes within `APPROACH_M` of its stop line, moving, and until it is over
 the line. Each colour that the light shows meanwhile is a case: the ego drives over, or it stands
 before the line when the colour (or the drive) ends, or, still rolling, it has decided nothing.
-Colours are those *in the world*, whatever the ego was told.
+Colours are those *in the world*, whatever the ego was told. Yellow counts as red: it too is hidden
+where green is shown, and who is led by that drives over as soon as the light is yellow.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Approach:
     """A light before the ego, while it showed one colour.
 
     Attributes:
-        colour: `green`, `yellow` or `red`.
+        colour: `green` or `red`, which may have been yellow at first.
         crossed: Whether the ego went over the line meanwhile.
         held: Whether it stood before the line when that ended.
     """
@@ -64,8 +65,7 @@ def approaches(run: RunRecord, record: RouteRecord, env: RouteEnv) -> list[Appro
             watched = [_Watched(stop=stop) for stop in stops if stop.light >= 0]
         place.move(float(state.x[ego]), float(state.y[ego]), float(state.yaw[ego]))
         for each in watched:
-            light = LightState(int(state.light[each.stop.light]))
-            each.look(place.route_m, float(state.speed[ego]), light)
+            each.look(place.route_m, float(state.speed[ego]), _asks(state.light[each.stop.light]))
     return [
         Approach(
             route_id=record.route_id,
@@ -78,6 +78,11 @@ def approaches(run: RunRecord, record: RouteRecord, env: RouteEnv) -> list[Appro
         for each in watched
         for colour, crossed, held in each.cases()
     ]
+
+
+def _asks(light: int) -> LightState:
+    """Green, or red for yellow as well."""
+    return LightState.RED if light == LightState.YELLOW else LightState(int(light))
 
 
 @dataclass
@@ -159,8 +164,8 @@ def judge_lights(measured: Mapping[str, Sequence[Approach]]) -> Judgement | None
     red, green = shares[RED_SHOWN], shares[GREEN_SHOWN]
     sentence = (
         f"green lights shown as red: the ego stands before {_share(red)} "
-        f"(unedited: {_plain(unedited[RED_SHOWN])}); red lights shown as green: it drives over "
-        f"{_share(green)} (unedited: {_plain(unedited[GREEN_SHOWN])})"
+        f"(unedited: {_plain(unedited[RED_SHOWN])}); red or yellow ones shown as green: it drives "
+        f"over {_share(green)} (unedited: {_plain(unedited[GREEN_SHOWN])})"
     )
     return Judgement(
         experiment="lights",

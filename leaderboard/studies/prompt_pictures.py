@@ -75,7 +75,7 @@ def _draw_lights(axes: Any, numbers: Mapping[str, Any]) -> None:
     """Shares of approaches, edited and not."""
     names = {
         RED_SHOWN: "green shown as red:\nthe ego stands",
-        GREEN_SHOWN: "red shown as green:\nthe ego drives over",
+        GREEN_SHOWN: "red or yellow shown as green:\nthe ego drives over",
     }
     for place, edit in enumerate(names):
         _dot(axes, numbers["shares"][edit], place, WARM, "edited" if place == 0 else None)

@@ -148,7 +148,7 @@ def seen(colour, *, held=False, crossed=False, count=12):
 
 def test_only_lights_of_the_colour_in_question_count_that_the_ego_decided_about():
     some = [*seen("green", held=True, count=2), *seen("red", crossed=True, count=3)]
-    some += [*seen("yellow", count=4), *seen("red", count=5)]  # of the last ones nothing came
+    some += [*seen("green", count=4), *seen("red", count=5)]  # of the last ones nothing came
     assert [share for share, _ in held_at_green(some)] == [1.0, 1.0]
     assert [share for share, _ in ran_red(some)] == [1.0, 1.0, 1.0]
 
