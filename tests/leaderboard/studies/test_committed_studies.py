@@ -32,8 +32,8 @@ def folder(request, tmp_path_factory):
     return place / request.param.name.removesuffix(".tar.xz")
 
 
-def test_there_are_studies():
-    assert ARCHIVES
+def test_there_are_an_ablation_and_a_study_of_prompt_editing():
+    assert [path.name.split("-")[0] for path in ARCHIVES] == ["ablation", "prompt"]
 
 
 def test_every_drive_of_the_study_is_one_of_its_runs(folder):
