@@ -13,6 +13,7 @@ from leaderboard.replay import replay_env
 from leaderboard.results import read_run
 from leaderboard.studies.ablation import work_out
 from leaderboard.studies.ablation_table import ablation_markdown
+from leaderboard.studies.approaches import GREEN_SHOWN, approaches
 from leaderboard.studies.prompt_editing import finding_sentence, judgements_of
 from leaderboard.studies.record import Drive
 from leaderboard.studies.rows import BASELINE, NULL
@@ -72,4 +73,17 @@ def test_drives_of_the_study_stand_up_to_a_replay(folder):
         env = replay_env(run)
         shortest = min(run.scored, key=lambda record: record.steps)
         assert verify_route(run, shortest, env).problems == ()
+        env.close()
+
+
+def test_a_light_that_was_yellow_as_the_ego_shown_green_drove_over_it_is_a_case(folder):
+    rows = [driven.row for driven in read_study(folder).rows if driven.row.edit == GREEN_SHOWN]
+    for row in rows:  # one of prompt editing, none of the ablation
+        run = read_run(folder / "rows" / row.name)
+        if differences := footing_differences(footing_here(), footing_of(run)):
+            pytest.skip(f"bits may differ: {'; '.join(differences)}")
+        env = replay_env(run)
+        record = next(each for each in run.scored if each.route_id == "5" and each.seed == 0)
+        found = [(each.colour, each.crossed) for each in approaches(run, record, env)]
+        assert found == [("green", False), ("red", True)]
         env.close()
