@@ -34,21 +34,21 @@ class AgentEntry:
 
 AGENTS: dict[str, AgentEntry] = {
     "expert": AgentEntry(
-        entry_point="agents.expert:Expert",
+        entry_point="agents.expert.agent:Expert",
         summary="rules over the true state: follows, predicts, yields, obeys lights and signs",
     ),
     "expert-blind": AgentEntry(
-        entry_point="agents.expert:Expert",
+        entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores all other actors (a control for traffic's politeness)",
         options={"ignore_actors": True},
     ),
     "expert-redrunner": AgentEntry(
-        entry_point="agents.expert:Expert",
+        entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores traffic lights (a control for the red-light rule)",
         options={"ignore_lights": True},
     ),
     "expert-signrunner": AgentEntry(
-        entry_point="agents.expert:Expert",
+        entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores stop signs (a control for the stop-sign rule)",
         options={"ignore_signs": True},
     ),
@@ -75,7 +75,7 @@ AGENTS: dict[str, AgentEntry] = {
 # still be reached by a longer one, or by its file.
 SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
-        entry_point="agents.carla:CarlaAgent",
+        entry_point="agents.carla.agent:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
     ),
     "driveinsight": AgentEntry(
@@ -84,7 +84,7 @@ SCHEMES: dict[str, AgentEntry] = {
         argument="weights",
     ),
     "sb3": AgentEntry(
-        entry_point="agents.sb3:Sb3Agent",
+        entry_point="agents.sb3.agent:Sb3Agent",
         summary="sb3:FILE.zip[?control_dt_s=0.2]: a model that Stable-Baselines3 saved",
     ),
 }

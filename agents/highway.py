@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agents.base import Control, Observation, Requirements, WorldView, make_control
-from di_envs.highway import OFF_ROAD, LaneIndex, lane_indices, to_lane, to_obstacle, to_vehicle
+from di_envs.highway.conversion import (
+    OFF_ROAD,
+    LaneIndex,
+    lane_indices,
+    to_lane,
+    to_obstacle,
+    to_vehicle,
+)
 from di_envs.town.lanes import LaneKind
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from agents.base import Control, Observation, Requirements, make_control
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.town.plan import RoutePlan
 
 

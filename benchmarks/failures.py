@@ -16,11 +16,11 @@ import tyro
 from PIL import Image, ImageDraw, ImageFont
 
 from di_envs.course import load_course
-from di_envs.render import MAP_PX, Renderer
-from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.replay import replay, replay_env
-from leaderboard.results import read_run
-from leaderboard.rules import rules_named
+from di_envs.drawing.view import MAP_PX, Renderer
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.results import read_run
+from leaderboard.replaying.replay import replay, replay_env
+from leaderboard.scoring.rules import rules_named
 
 BEFORE_S = (3.0, 1.5, 0.0)  # moments before an infraction that are shown
 PANEL_PX, TITLE_PX, GAP_PX = 300, 26, 6

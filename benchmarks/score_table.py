@@ -10,11 +10,11 @@ import argparse
 import math
 from pathlib import Path
 
-from leaderboard.confidence import mean_interval
-from leaderboard.record import RunRecord
-from leaderboard.report import driving_interval, mean_bound, seed_means
-from leaderboard.results import ResultsError, read_run
-from leaderboard.rules import rules_named
+from leaderboard.records.record import RunRecord
+from leaderboard.records.results import ResultsError, read_run
+from leaderboard.scoring.rules import rules_named
+from leaderboard.statistics.confidence import mean_interval
+from leaderboard.tables.run_tables import driving_interval, mean_bound, seed_means
 
 HEADER = (
     "| agent | track | suite | DS | RC | IS | bound | infractions a km |",

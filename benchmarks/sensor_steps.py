@@ -17,7 +17,7 @@ import numpy as np
 from step_rate import record_drive
 
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.camera_config import RIGS
+from di_envs.sensors.camera.config import RIGS
 
 VEHICLES, WALKERS = 120, 60
 GROUPS = ("camera", "lidar", "prompt")

@@ -20,12 +20,12 @@ from rich.progress import Progress
 from rich.table import Table
 from sensor_steps import highway_contender, our_contenders, racing_contender, step_rates
 
-from di_envs.kernels import cpu_capability
-from di_envs.sensors.camera import CameraRig
-from di_envs.sensors.camera_config import RIGS
-from di_envs.sensors.lidar import Lidar
-from di_envs.sensors.lidar_config import LIDARS
-from di_envs.sensors.scene import scene_of
+from di_envs.numerics.kernels import cpu_capability
+from di_envs.sensors.camera.cameras import CameraRig
+from di_envs.sensors.camera.config import RIGS
+from di_envs.sensors.lidar.config import LIDARS
+from di_envs.sensors.lidar.sweep import Lidar
+from di_envs.sensors.scene.scene import scene_of
 from di_envs.sensors.weather import weather_of
 from di_envs.town.loading import load_town
 from di_envs.world.world import World, WorldConfig

@@ -28,10 +28,10 @@ from rich.progress import track
 
 from agents import load_agent
 from di_envs.config import OBSERVATION_GROUPS
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.camera_config import RIGS
-from di_envs.sensors.lidar_config import LIDARS
+from di_envs.sensors.camera.config import RIGS
+from di_envs.sensors.lidar.config import LIDARS
 from di_envs.sensors.weather import PRESETS
 
 EPISODE_STEPS = 300  # at most, so that many weathers are seen

@@ -27,7 +27,7 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent
-from di_envs.kernels import cpu_capability
+from di_envs.numerics.kernels import cpu_capability
 from di_envs.route_env import RouteEnv
 from di_envs.town.loading import load_town
 from di_envs.town.town import Town
@@ -177,7 +177,7 @@ def measure_highway(bench: Bench, world_tick: Times | None) -> None:
     with bench.doing("importing highway-env and making its road"):
         from highway_env.road.road import Road
 
-        from di_envs.highway import to_highway_road
+        from di_envs.highway.conversion import to_highway_road
 
         env = RouteEnv(suite="town05_long", observations=("prompt",), walkers=0)
         record_drive(env, WARM_UP_S)  # leads to the scene

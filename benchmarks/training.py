@@ -18,9 +18,9 @@ import tyro
 
 from agents.driveinsight.config import config_named
 from agents.training.collect import DriveJob, drive_job, drive_paths
+from agents.training.config import TrainConfig
+from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments
-from agents.training.train_config import TrainConfig
-from agents.training.training import Training
 
 TOWNS = ("small_grid", "suburb")
 CONFIGS = ("small", "small-prompt-only", "tiny")

@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 import di_envs  # noqa: F401 (registers the ids)
-from di_envs.kernels import cpu_capability
+from di_envs.numerics.kernels import cpu_capability
 from di_envs.vector_env import RouteVectorEnv
 
 GROUPS = {"prompt": ("prompt",), "camera, lidar, prompt": ("camera", "lidar", "prompt")}

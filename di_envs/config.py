@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
-from di_envs.sensors.camera_config import Rig, rig_of
-from di_envs.sensors.lidar_config import SWEEP_S, LidarConfig, lidar_of
+from di_envs.sensors.camera.config import Rig, rig_of
+from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
 
 OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar", "odometry")

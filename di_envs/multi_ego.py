@@ -18,12 +18,12 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from di_envs.actions import action_space, checked_action
+from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import check_name
 from di_envs.course import load_course
-from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.drawing.screen import Screen, check_render_mode
+from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.reward import standing_of
-from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import ActorKind
 from di_envs.world.world import Snapshot, World, WorldView

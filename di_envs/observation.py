@@ -14,9 +14,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
-from di_envs.kernels import bind, kernel
-from di_envs.map_chunks import POINTS, MapChunks, MapKind, build_map_chunks
+from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.kernels import bind, kernel
 from di_envs.prompt import (
     COMPONENTS,
     LIGHTS,
@@ -34,14 +33,15 @@ from di_envs.prompt import (
     prompt_route_of,
     stop_lines_of,
 )
-from di_envs.sensors.camera import FAR_M, CameraRig
-from di_envs.sensors.camera_config import Rig, rig_of
+from di_envs.sensors.camera.cameras import FAR_M, CameraRig
+from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
-from di_envs.sensors.lidar import Lidar
-from di_envs.sensors.lidar_config import LidarConfig, lidar_of
-from di_envs.sensors.tags import Tag
+from di_envs.sensors.lidar.config import LidarConfig, lidar_of
+from di_envs.sensors.lidar.sweep import Lidar
+from di_envs.sensors.scene.tags import Tag
 from di_envs.sensors.weather import weather_of
 from di_envs.town.lanes import Lanes, LightState
+from di_envs.town.map_chunks import POINTS, MapChunks, MapKind, build_map_chunks
 from di_envs.town.plan import RoadOption
 from di_envs.town.town import Town
 from di_envs.world.state import SPEED_HISTORY, ActorKind, State

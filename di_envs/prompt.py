@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
-from di_envs.geometry import to_local, wrap_angle
-from di_envs.kernels import kernel
-from di_envs.map_chunks import CELL_M, POINTS, RANGE_M, MapChunks
+from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.geometry import to_local, wrap_angle
+from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import SignalKind, Signals
+from di_envs.town.map_chunks import CELL_M, POINTS, RANGE_M, MapChunks
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import HISTORY_LENGTH, HISTORY_TICKS, SPEED_HISTORY, ActorKind
 

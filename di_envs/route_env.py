@@ -10,13 +10,13 @@ from typing import Any, Self
 import gymnasium
 import numpy as np
 
-from di_envs.actions import action_space, checked_action
+from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
 from di_envs.course import load_course
-from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.drawing.screen import Screen, check_render_mode
+from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.observation import Observer
 from di_envs.reward import Standing, standing_of
-from di_envs.screen import Screen, check_render_mode
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, Snapshot, World, WorldView
 
@@ -71,8 +71,8 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
 
         Args:
             render_mode: `rgb_array`: `render` returns a picture for people, see
-                `di_envs.render`. `human`: a window shows it after each reset and step. None: no
-                pictures.
+                `di_envs.drawing.view`. `human`: a window shows it after each reset and step. None:
+                no pictures.
             options: See `RouteEnvConfig`.
 
         Raises:

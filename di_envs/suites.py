@@ -14,12 +14,12 @@ from typing import Any, Self
 
 from di_envs.config import WEATHERS, check_name
 from di_envs.town.plan import RoutePlan
-from di_envs.town.road_graph import build_road_graph
-from di_envs.town.router import MAX_SNAP_M, plan_route
-from di_envs.town.routes import RouteSpec, read_routes
-from di_envs.town.scenarios import with_scenarios
+from di_envs.town.routing.road_graph import build_road_graph
+from di_envs.town.routing.router import MAX_SNAP_M, plan_route
+from di_envs.town.routing.routes import RouteSpec, read_routes
+from di_envs.town.routing.scenarios import with_scenarios
+from di_envs.town.routing.trigger_files import PlacedScenario, read_triggers
 from di_envs.town.town import Town
-from di_envs.town.trigger_files import PlacedScenario, read_triggers
 
 DATA = Path(__file__).resolve().parent / "town" / "data"
 NO_SCENARIOS = "none"  # in place of a trigger file

@@ -13,7 +13,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.saving import restore, save
 
 Environment = gymnasium.Env[Any, Any]

@@ -21,7 +21,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from di_envs.actions import HIGH, LOW, checked_action
+from di_envs.actions.checked import HIGH, LOW, checked_action
 from di_envs.reward import Standing
 from di_envs.route_env import Info, Observation, RouteEnv, RouteEnvSnapshot
 from di_envs.vector_rows import WorldRows, batched_infos

@@ -21,12 +21,12 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from leaderboard.cli import main as driveinsight
-from leaderboard.record import RunRecord
-from leaderboard.report import summary
-from leaderboard.results import read_run
-from leaderboard.rules import rules_named
-from leaderboard.score import mean_score
+from leaderboard.commands.cli import main as driveinsight
+from leaderboard.records.record import RunRecord
+from leaderboard.records.results import read_run
+from leaderboard.scoring.rules import rules_named
+from leaderboard.scoring.score import mean_score
+from leaderboard.tables.run_tables import summary
 
 SUITE = "town05_tiny"  # 105 short routes over single crossings, in a town that training never sees
 ELSEWHERE = 1000  # the first of the drives that are corrected: none that the expert has shown

@@ -13,7 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from agents.base import Control, Observation, Requirements
-from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
+from di_envs.actions.controllers import (
+    ControllerMemory,
+    WaypointControllerConfig,
+    waypoints_to_control,
+)
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from leaderboard.cli import main as run_command
+from leaderboard.commands.cli import main as run_command
 
 
 def main() -> None:

@@ -17,15 +17,15 @@ import tyro
 import di_envs
 from agents import AGENTS
 from agents.base import Requirements
-from di_envs.edit_conditions import Condition
-from di_envs.edit_text import read_edits
+from di_envs.edits.conditions import Condition
+from di_envs.edits.text import read_edits
+from di_envs.edits.world import WORLD_EDITS, read_world_edits
 from di_envs.observation import observation_space
 from di_envs.penalties import PENALTIES
 from di_envs.reward import Standing, reward_terms
 from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
-from di_envs.world_edits import WORLD_EDITS, read_world_edits
-from leaderboard.cli import Command, Evaluate
+from leaderboard.commands.cli import Command, Evaluate
 from leaderboard.commands.train import Train
 from wrappers.interventions import EDITS, ObservationEditing
 

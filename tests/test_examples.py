@@ -11,8 +11,8 @@ import pytest
 
 from agents import load_agent
 from agents.base import Track
-from leaderboard.driver import Driver
-from leaderboard.jobs import Job, RunSpec
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import Job, RunSpec
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
@@ -121,7 +121,7 @@ if sys.argv[2] == "hidden":
     sys.modules["carla"] = None
 from agents import load_agent
 from di_envs import RouteEnv
-from leaderboard.driver import environment_options
+from leaderboard.running.driver import environment_options
 agent = load_agent(sys.argv[1])
 suite = {"suite": "town05_short", "traffic": 10, "walkers": 0, "route_ids": ("14",)}
 env = RouteEnv(**environment_options(suite, agent.requires))

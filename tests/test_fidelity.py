@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.scene import scene_of
-from di_envs.sensors.tags import Tag
+from di_envs.sensors.scene.scene import scene_of
+from di_envs.sensors.scene.tags import Tag
 from di_envs.world.dynamics import EgoModel, longitudinal_acceleration, move_ego
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import Capacity, state_dtype, views_of

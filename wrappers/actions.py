@@ -11,8 +11,12 @@ from gymnasium.vector import VectorEnv
 from gymnasium.wrappers.vector import TransformAction
 from numpy.typing import NDArray
 
-from di_envs.action_forms import WAYPOINT_DT_S, pedal_space, pedal_to_control, waypoint_space
-from di_envs.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
+from di_envs.actions.controllers import (
+    ControllerMemory,
+    WaypointControllerConfig,
+    waypoints_to_control,
+)
+from di_envs.actions.forms import WAYPOINT_DT_S, pedal_space, pedal_to_control, waypoint_space
 from di_envs.prompt import SPEED_LIMIT_MPS
 
 Observation = Mapping[str, Any]
@@ -43,8 +47,8 @@ class WaypointWrapper(gymnasium.ActionWrapper[Observation, Action, Action]):
     """Takes where the ego should be in 0.5 s, 1 s, … 4 s, and steers it there by two PIDs.
 
     The action is (8, 2): x ahead, y right [m], in the ego's frame of the moment. The controllers
-    (`di_envs.controllers`) look at the first two points. Their past errors and the speed that they
-    last saw are what `di_envs.save` keeps of this wrapper.
+    (`di_envs.actions.controllers`) look at the first two points. Their past errors and the speed
+    that they last saw are what `di_envs.save` keeps of this wrapper.
     """
 
     def __init__(

@@ -16,7 +16,6 @@ from torch import Tensor
 
 from agents import AgentSpecError
 from agents.base import Control, Observation, Requirements
-from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.explained import ExplainedAgent
 from agents.driveinsight.inputs import inputs_of
@@ -26,7 +25,12 @@ from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
 from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
 from agents.one_thread import one_thread
-from di_envs.edit_text import EditText
+from di_envs.actions.controllers import (
+    ControllerMemory,
+    WaypointControllerConfig,
+    waypoints_to_control,
+)
+from di_envs.edits.text import EditText
 from di_envs.town.plan import RoutePlan
 
 SHIPPED = Path(__file__).parent / "weights"

@@ -13,7 +13,7 @@ from agents.driveinsight.lift import FrustumPooling
 from agents.driveinsight.pyramid import FeaturePyramid
 from agents.driveinsight.resnet import ResNet
 from agents.driveinsight.taps import Tap
-from di_envs.sensors.camera_config import rig_of
+from di_envs.sensors.camera.config import rig_of
 
 # Of ImageNet's pixels, as published weights expect them
 _MEAN = (123.675, 116.28, 103.53)

@@ -13,7 +13,7 @@ from typing import Any, Self, TypeVar
 
 from di_envs.config import check_name
 from di_envs.prompt import COMPONENTS
-from di_envs.sensors.camera_config import rig_of
+from di_envs.sensors.camera.config import rig_of
 
 T = TypeVar("T")
 

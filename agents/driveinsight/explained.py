@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from torch import Tensor, nn
 
 from agents.base import Observation
 from agents.driveinsight.config import BEV, TOKENS, PolicyConfig
+from agents.driveinsight.model import Output, Policy
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
-from di_envs.sensors.camera_config import rig_of
+from di_envs.sensors.camera.config import rig_of
 
-if TYPE_CHECKING:
-    from agents.driveinsight.agent import DriveInsightAgent
+
+class Planning(Protocol):
+    """All that is asked of the agent whose policy is explained."""
+
+    policy: Policy
+
+    def plan(self, observation: Observation, memory: Any) -> Output: ...
 
 
 class ExplainedAgent:
@@ -21,7 +27,7 @@ class ExplainedAgent:
     Taps show an activation as it comes, before an edit of that tap.
     """
 
-    def __init__(self, agent: DriveInsightAgent) -> None:
+    def __init__(self, agent: Planning) -> None:
         self._agent = agent
         self.anatomy = anatomy_of(agent.policy.config)
 

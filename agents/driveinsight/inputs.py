@@ -12,7 +12,7 @@ from torch import Tensor
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.model import Inputs
 from di_envs.prompt import COMPONENTS
-from di_envs.sensors.camera_config import rig_of
+from di_envs.sensors.camera.config import rig_of
 
 
 def inputs_of(config: PolicyConfig, observation: Mapping[str, Any]) -> Inputs:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from agents.driveinsight.config import CameraEncoderConfig, GridConfig
-from di_envs.sensors.camera_config import CameraConfig, Rig
+from di_envs.sensors.camera.config import CameraConfig, Rig
 
 
 def depths_m(config: CameraEncoderConfig) -> NDArray[np.float64]:

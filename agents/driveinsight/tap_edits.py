@@ -23,9 +23,9 @@ from torch import Tensor, nn
 
 from agents.driveinsight.taps import Edit, tap_names
 from di_envs.config import check_name
-from di_envs.edit_conditions import ALWAYS, Condition
-from di_envs.edit_text import EditError, EditText
-from di_envs.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
+from di_envs.edits.conditions import ALWAYS, Condition
+from di_envs.edits.text import EditError, EditText
+from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 
 BEV = "bev"
 _BEV_MAPS = ("memory.bev", "fusion.bev")  # the last one that a policy has

@@ -14,9 +14,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from agents.driveinsight.taps import Tap
-from di_envs.map_chunks import MapKind
 from di_envs.prompt import COMPONENTS, ROUTING_POINTS, SPEED_HISTORY
 from di_envs.town.lanes import LightState
+from di_envs.town.map_chunks import MapKind
 from di_envs.town.plan import RoadOption
 from di_envs.world.kinds import ActorKind
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from agents.driveinsight.config import GridConfig
 from agents.driveinsight.semantics import BevClass
-from di_envs.kernels import kernel
-from di_envs.sensors.scene import scene_of
-from di_envs.sensors.surfaces import TEXEL_M
-from di_envs.sensors.tags import TAG_BITS, Tag
+from di_envs.numerics.kernels import kernel
+from di_envs.sensors.scene.scene import scene_of
+from di_envs.sensors.scene.surfaces import TEXEL_M
+from di_envs.sensors.scene.tags import TAG_BITS, Tag
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.kinds import ActorKind
 from di_envs.world.world import WorldView

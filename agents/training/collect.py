@@ -35,7 +35,7 @@ from agents.training.frames import (
     write_whole,
 )
 from agents.training.towns import town_files
-from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
 from di_envs.town.plan import RoadOption
 from di_envs.world.kinds import EventKind

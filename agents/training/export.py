@@ -34,11 +34,11 @@ from agents.training.towns import load_training_town
 from agents.training.variation import FOURTEEN_WEATHERS
 from agents.training.waypoints import expert_waypoints
 from di_envs.config import check_name
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.observation import Observer
 from di_envs.prompt import COMPONENTS
-from di_envs.sensors.camera_config import rig_of
-from di_envs.sensors.lidar_config import lidar_of
+from di_envs.sensors.camera.config import rig_of
+from di_envs.sensors.lidar.config import lidar_of
 from di_envs.town.plan import RoadOption, RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.state import Capacity

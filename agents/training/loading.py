@@ -23,13 +23,13 @@ from torch.utils.data import DataLoader, Dataset
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.collect import drive_paths
+from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, Drive, DriveFileError, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import load_training_town
-from agents.training.train_config import TrainConfig, TrainingError
 from agents.training.variation import Variation
-from di_envs.keyed_random import Stream, keyed_hash, uniform
+from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
 
 STANDING_MPS = 0.1
 PREFETCHED = 4  # batches that each process renders ahead

@@ -9,7 +9,7 @@ from typing import Any
 from torch import nn
 
 from agents.driveinsight.config import PolicyConfig
-from agents.training.train_config import TrainConfig
+from agents.training.config import TrainConfig
 
 _LIMITS = """\
 It has seen made-up towns of this simulator only, with its own pictures of them, driven by the

@@ -26,9 +26,9 @@ from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import Drive, DriveStage
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.observation import Observer
-from di_envs.sensors.camera_config import Rig, rig_of
+from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 

@@ -23,17 +23,17 @@ from platformdirs import user_cache_path
 
 from agents.training.street_grids import TownStyle, street_tables
 from di_envs.config import check_name
-from di_envs.town.build_routes import random_way
-from di_envs.town.build_scenarios import build_scenarios
-from di_envs.town.junction_layout import town_text
+from di_envs.town.building.junction_layout import town_text
+from di_envs.town.building.routes import random_way
+from di_envs.town.building.scenarios import build_scenarios
+from di_envs.town.building.street_plan import plan_of
+from di_envs.town.building.ways import find_route
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
-from di_envs.town.road_graph import build_road_graph
-from di_envs.town.routes import RouteSpec, write_routes
-from di_envs.town.street_plan import plan_of
+from di_envs.town.routing.road_graph import build_road_graph
+from di_envs.town.routing.routes import RouteSpec, write_routes
+from di_envs.town.routing.trigger_files import write_triggers
 from di_envs.town.town import Town
-from di_envs.town.trigger_files import write_triggers
-from di_envs.town.ways import find_route
 
 VERSION = 1  # of the recipes here; a change that can move a lane, a route or a trigger raises it
 ROUTES = 60

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from di_envs.config import WEATHERS
-from di_envs.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 
 FOURTEEN_WEATHERS = WEATHERS[:14]
 

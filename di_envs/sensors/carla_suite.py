@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from di_envs.sensors.camera_config import CameraConfig, Rig
-from di_envs.sensors.lidar_config import LidarConfig, lidar_of
+from di_envs.sensors.camera.config import CameraConfig, Rig
+from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 
 
 class SensorType(StrEnum):

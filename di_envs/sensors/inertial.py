@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 
-from di_envs.geometry import wrap_angle
-from di_envs.kernels import kernel
-from di_envs.keyed_random import Stream, normal
+from di_envs.numerics.geometry import wrap_angle
+from di_envs.numerics.kernels import kernel
+from di_envs.numerics.keyed_random import Stream, normal
 from di_envs.town.queries import pose_at
 
 GRAVITY_MPS2 = 9.81

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
+from di_envs.numerics.bundles import by_reference
 
 SUN_AZIMUTH_RAD = math.radians(125.0)  # in the world frame: where the sun stands
 

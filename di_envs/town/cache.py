@@ -22,23 +22,23 @@ from di_envs.town.town import Town
 
 # The modules that decide what a town's arrays hold; a test compares them with what is imported.
 READER_MODULES = (
-    "arms",
     "cache",
-    "conflicts",
-    "crosswalks",
     "lanes",
-    "links",
     "loading",
-    "map_signals",
-    "network",
-    "opendrive",
-    "opendrive_records",
     "queries",
-    "reference_line",
-    "sampling",
-    "sidecar",
-    "signals",
-    "stretches",
+    "reading.arms",
+    "reading.conflicts",
+    "reading.crosswalks",
+    "reading.links",
+    "reading.map_signals",
+    "reading.network",
+    "reading.opendrive",
+    "reading.records",
+    "reading.reference_line",
+    "reading.sampling",
+    "reading.sidecar",
+    "reading.signals",
+    "reading.stretches",
     "town",
 )
 
@@ -52,7 +52,7 @@ def reader_version() -> str:
     """A hash of the reader's own source: another reader may read otherwise."""
     digest = hashlib.sha256()
     for name in READER_MODULES:
-        path = Path(__file__).with_name(f"{name}.py")
+        path = Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py")
         digest.update(name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
+from di_envs.numerics.bundles import by_reference
 
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]

@@ -7,16 +7,21 @@ import warnings
 from pathlib import Path
 
 from di_envs.town import cache
-from di_envs.town.crosswalks import find_crosswalks
 from di_envs.town.lanes import Lanes
-from di_envs.town.map_signals import heads_in_map
-from di_envs.town.network import build_lanes, junction_names
-from di_envs.town.opendrive import read_opendrive
-from di_envs.town.opendrive_records import OpenDrive
-from di_envs.town.sampling import LaneGeometry
-from di_envs.town.sidecar import enforced_limits, guessed_heads, heads_of_sidecar, read_sidecar
-from di_envs.town.signals import Head, assemble_signals
-from di_envs.town.stretches import Stretch
+from di_envs.town.reading.crosswalks import find_crosswalks
+from di_envs.town.reading.map_signals import heads_in_map
+from di_envs.town.reading.network import build_lanes, junction_names
+from di_envs.town.reading.opendrive import read_opendrive
+from di_envs.town.reading.records import OpenDrive
+from di_envs.town.reading.sampling import LaneGeometry
+from di_envs.town.reading.sidecar import (
+    enforced_limits,
+    guessed_heads,
+    heads_of_sidecar,
+    read_sidecar,
+)
+from di_envs.town.reading.signals import Head, assemble_signals
+from di_envs.town.reading.stretches import Stretch
 from di_envs.town.town import Town
 
 _DATA = Path(__file__).resolve().parent / "data"
@@ -40,8 +45,8 @@ def load_town(
         town: A shipped town's name ("town05", "toy") or an OpenDRIVE file.
         signals: Where signals come from. None: the map; a map that carries none gives a warning.
             "town05": the shipped sidecar for CARLA's own Town05, of any year. A file: a sidecar
-            (`di_envs.town.sidecar` has its format). "synthesise": a guess from the junctions'
-            shapes. "none": there are none.
+            (`di_envs.town.reading.sidecar` has its format). "synthesise": a guess from the
+            junctions' shapes. "none": there are none.
         cache_folder: Where parsed towns are kept; by default the user's cache folder.
 
     Raises:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from di_envs.kernels import kernel
+from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import LaneKind
 
 LEVEL_M = 2.5  # a lane further above or below does not count

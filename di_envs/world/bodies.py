@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from di_envs.kernels import kernel
+from di_envs.numerics.kernels import kernel
 
 LARGEST_M = 60.0  # no two bodies touch whose middles are further apart
 SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels

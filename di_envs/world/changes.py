@@ -14,10 +14,10 @@ from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import nearest_driving_lane_towards, pose_at, project_to_lane
 from di_envs.world.lights import show_lights
 from di_envs.world.state import ActorKind, State
-from di_envs.world.traffic_tables import TrafficTables
-from di_envs.world.vehicle_motion import choose_path, place_vehicle
-from di_envs.world.walk_graph import WalkGraph
-from di_envs.world.walkers import place_on_edge
+from di_envs.world.traffic.motion import choose_path, place_vehicle
+from di_envs.world.traffic.tables import TrafficTables
+from di_envs.world.walkers.strolling import place_on_edge
+from di_envs.world.walkers.walk_graph import WalkGraph
 
 REACH_M = 3.0  # from a lane or way, within which an actor is set down on it
 LEVEL_M = 3.0

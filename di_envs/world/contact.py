@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
-from di_envs.kernels import kernel
+from di_envs.numerics.kernels import kernel
 from di_envs.world.bodies import box_of, may_touch, overlap
-from di_envs.world.collisions import count_collision, forget_collisions
-from di_envs.world.event_rows import count_rows
+from di_envs.world.events.collisions import count_collision, forget_collisions
+from di_envs.world.events.rows import count_rows
 from di_envs.world.state import ActorKind
 
 SLOP_M = 1e-3  # left between bodies that were pushed apart

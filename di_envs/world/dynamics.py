@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from di_envs.bundles import by_reference
-from di_envs.geometry import wrap_angle
-from di_envs.kernels import kernel
+from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.geometry import wrap_angle
+from di_envs.numerics.kernels import kernel
 from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
 from di_envs.world.state import HISTORY_LENGTH, TICK_S
 

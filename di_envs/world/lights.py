@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from di_envs.kernels import kernel
-from di_envs.keyed_random import Stream, keyed_hash
+from di_envs.numerics.kernels import kernel
+from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.state import TICK_S
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
+from di_envs.numerics.bundles import by_reference
 from di_envs.world.kinds import TICK_S as TICK_S
 from di_envs.world.kinds import ActorKind as ActorKind
 from di_envs.world.kinds import EventKind as EventKind

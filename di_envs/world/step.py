@@ -8,26 +8,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.bundles import by_reference
-from di_envs.kernels import kernel
+from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
-from di_envs.world.approach import Requests, note_ego_arrival
 from di_envs.world.contact import resolve_contacts
 from di_envs.world.dynamics import EgoParameters, locate_ego, move_ego
-from di_envs.world.events import detect_events
-from di_envs.world.lane_change import change_lanes
+from di_envs.world.events.progress import advance_progress
+from di_envs.world.events.watching import detect_events
 from di_envs.world.lights import advance_lights
-from di_envs.world.occupancy import Occupancy, fill_occupancy
-from di_envs.world.progress import advance_progress
-from di_envs.world.right_of_way import update_grants
-from di_envs.world.scenario_tables import ScenarioTables
-from di_envs.world.scenarios import move_scenarios, occupy_crossings, watch_scenarios
+from di_envs.world.scenarios.staging import move_scenarios, occupy_crossings, watch_scenarios
+from di_envs.world.scenarios.tables import ScenarioTables
 from di_envs.world.state import ActorKind, Routes
-from di_envs.world.traffic import Leaders, choose_speed, find_leaders
-from di_envs.world.traffic_tables import TrafficTables
-from di_envs.world.vehicle_motion import move_vehicle, take_another_way
-from di_envs.world.walk_graph import WalkGraph
-from di_envs.world.walkers import mark_busy_crosswalks, move_walkers
+from di_envs.world.traffic.approach import Requests, note_ego_arrival
+from di_envs.world.traffic.decisions import Leaders, choose_speed, find_leaders
+from di_envs.world.traffic.lane_change import change_lanes
+from di_envs.world.traffic.motion import move_vehicle, take_another_way
+from di_envs.world.traffic.occupancy import Occupancy, fill_occupancy
+from di_envs.world.traffic.right_of_way import update_grants
+from di_envs.world.traffic.tables import TrafficTables
+from di_envs.world.walkers.strolling import mark_busy_crosswalks, move_walkers
+from di_envs.world.walkers.walk_graph import WalkGraph
 
 _ABSENT = int(ActorKind.ABSENT)
 

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.kernels import bind
+from di_envs.numerics.kernels import bind
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
-from di_envs.world.approach import make_requests
 from di_envs.world.changes import (
     ChangeError,
     check_actor,
@@ -25,13 +24,11 @@ from di_envs.world.changes import (
     remove_actor,
 )
 from di_envs.world.dynamics import EgoModel, locate_ego
-from di_envs.world.event_rows import COLUMNS, ROWS_PER_EGO
-from di_envs.world.events import begin_events
+from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
+from di_envs.world.events.watching import begin_events
 from di_envs.world.lights import start_lights
-from di_envs.world.occupancy import make_occupancy
 from di_envs.world.poles import place_poles
-from di_envs.world.scenario_tables import actors_needed, call_off, scenario_tables
-from di_envs.world.spawn import spawn_traffic
+from di_envs.world.scenarios.tables import actors_needed, call_off, scenario_tables
 from di_envs.world.state import (
     OCCUPIED_LANES,
     ActorKind,
@@ -43,10 +40,13 @@ from di_envs.world.state import (
     views_of,
 )
 from di_envs.world.step import Scenery, Scratch, advance
-from di_envs.world.traffic import make_leaders
-from di_envs.world.traffic_tables import traffic_tables
-from di_envs.world.walk_graph import build_walk_graph
-from di_envs.world.walkers import spawn_walkers
+from di_envs.world.traffic.approach import make_requests
+from di_envs.world.traffic.decisions import make_leaders
+from di_envs.world.traffic.occupancy import make_occupancy
+from di_envs.world.traffic.spawn import spawn_traffic
+from di_envs.world.traffic.tables import traffic_tables
+from di_envs.world.walkers.strolling import spawn_walkers
+from di_envs.world.walkers.walk_graph import build_walk_graph
 
 STATE_VERSION = "2"  # of the record's layout and meaning; a snapshot of another is refused
 

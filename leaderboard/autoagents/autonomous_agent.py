@@ -1,7 +1,7 @@
 """The base class of agents for the CARLA Leaderboard, with the constructors of 1.0 and of 2.x.
 
 An agent's file imports it from here as it does from CARLA's own package, so that it runs in both;
-`--agent carla:FILE` drives it (see `agents.carla`).
+`--agent carla:FILE` drives it (see `agents.carla.agent`).
 Source: interface of the Leaderboard's branches `leaderboard-1.0` and `leaderboard-2.1` (MIT
 licence); our own code.
 """
@@ -64,7 +64,7 @@ class AutonomousAgent:
         """Decides.
 
         Args:
-            input_data: By sensor id, the frame and its data (formats: `agents.carla_formats`).
+            input_data: By sensor id, the frame and its data (formats: `agents.carla.formats`).
             timestamp: Seconds of game time since the route began.
 
         Returns:

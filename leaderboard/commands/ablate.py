@@ -52,10 +52,10 @@ class Ablate(StudyArguments):
         return choose_rows(self.rows, self.only)
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
+        from leaderboard.pages.study_files import write_ablation
         from leaderboard.studies.ablation import work_out
-        from leaderboard.studies.ablation_table import ablation_tables
-        from leaderboard.studies.results import write_ablation
         from leaderboard.studies.study_file import STUDY_FILE
+        from leaderboard.tables.ablation_table import ablation_tables
 
         ablation = work_out(study)
         written = write_ablation(folder, ablation)

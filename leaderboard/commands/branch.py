@@ -11,7 +11,7 @@ from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.work_bar import work_bar
+from leaderboard.running.displays.work_bar import work_bar
 
 BRANCH_HELP = """Ask what would have happened: change the world at a moment of a recorded drive.
 
@@ -54,10 +54,10 @@ class Branch:
 
     def run(self) -> int:
         """Branches; returns the exit code."""
-        from di_envs.edit_text import EditError
-        from di_envs.world_edits import read_world_edits
-        from leaderboard.chosen_route import RouteChoiceError, chosen_route
-        from leaderboard.results import ResultsError, prepare_folder, read_run, write_run
+        from di_envs.edits.text import EditError
+        from di_envs.edits.world import read_world_edits
+        from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
+        from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
 
         try:
             edits = read_world_edits(self.world)
@@ -68,10 +68,10 @@ class Branch:
         except (EditError, ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
 
-        from leaderboard.branch import BranchError, branch, branch_run, same_future
-        from leaderboard.branch_picture import write_branch_picture
-        from leaderboard.branch_text import branch_tables
-        from leaderboard.replay import ReplayError
+        from leaderboard.pages.branch_picture import write_branch_picture
+        from leaderboard.replaying.branch import BranchError, branch, branch_run, same_future
+        from leaderboard.replaying.replay import ReplayError
+        from leaderboard.tables.branch_text import branch_tables
 
         try:
             with work_bar("branching", "s", transient=True) as bar:

@@ -76,8 +76,8 @@ class Collect:
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.towns import TRAINING_TOWNS
         from di_envs.config import check_name
-        from leaderboard.compiling import compile_progress
-        from leaderboard.jobs import SetupError
+        from leaderboard.running.compiling import compile_progress
+        from leaderboard.running.jobs import SetupError
 
         towns = tuple(dict.fromkeys(self.towns or TRAINING_TOWNS))
         try:
@@ -108,15 +108,15 @@ class Collect:
         """The cluster; None for processes of this machine."""
         if self.engine == "local":
             return None
-        from leaderboard.ray_collect import ray_pool
+        from leaderboard.running.workers.ray_collect import ray_pool
 
         return ray_pool(self.workers, self.address)
 
     def _collect(self, towns: tuple[str, ...]) -> bool:
         """Drives; returns whether all is there."""
         from agents.training.collect import collect, share_of
-        from leaderboard.interruption import interruptible
-        from leaderboard.work_bar import work_bar
+        from leaderboard.running.displays.work_bar import work_bar
+        from leaderboard.running.interruption import interruptible
 
         total = share_of(self.frames, towns) * len(towns)
         began_s, driven = time.monotonic(), 0

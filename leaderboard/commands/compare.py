@@ -37,11 +37,11 @@ class Compare:
 
     def run(self) -> int:
         """Compares; returns the exit code."""
-        from leaderboard.comparing import PairingError, compare_runs
-        from leaderboard.comparison_table import comparison_tables
-        from leaderboard.rescoring import rescored
-        from leaderboard.results import ResultsError, read_run
-        from leaderboard.rules import rules_named
+        from leaderboard.records.rescoring import rescored
+        from leaderboard.records.results import ResultsError, read_run
+        from leaderboard.scoring.rules import rules_named
+        from leaderboard.studies.comparing import PairingError, compare_runs
+        from leaderboard.tables.comparison_table import comparison_tables
 
         try:
             runs = [read_run(path) for path in (self.first, self.second)]

@@ -44,9 +44,9 @@ class Drive(SceneArguments):
         """Drives; returns the exit code."""
         options, _ = self.choose(() if self.route is None else (self.route,))
 
-        from leaderboard.drive import drive, record_lines
-        from leaderboard.jobs import RunSpec, SetupError
-        from leaderboard.video import VideoError, check_video
+        from leaderboard.running.drive import drive, record_lines
+        from leaderboard.running.jobs import RunSpec, SetupError
+        from leaderboard.running.video import VideoError, check_video
 
         spec = RunSpec(
             agent=self.agent, options=options, rules=self.rules, interventions=self.edits()

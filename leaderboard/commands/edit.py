@@ -67,7 +67,7 @@ class Edit(StudyArguments):
         )
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
-        from leaderboard.studies.results import print_prompt_editing, write_prompt_editing
+        from leaderboard.pages.study_files import print_prompt_editing, write_prompt_editing
         from leaderboard.studies.study_file import STUDY_FILE
 
         written = write_prompt_editing(folder, study)

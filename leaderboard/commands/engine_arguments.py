@@ -10,7 +10,7 @@ from leaderboard.commands.ending import UsageError
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
-    from leaderboard.engines import Engine
+    from leaderboard.running.workers.local_engine import Engine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class EngineArguments:
         """What keeps an engine's connection over several runs: a cluster starts but once."""
         if self.engine == "local":
             return nullcontext()
-        from leaderboard.ray_engine import cluster
+        from leaderboard.running.workers.ray_engine import cluster
 
         return cluster(self.workers, self.address)
 
@@ -61,8 +61,8 @@ class EngineArguments:
         Raises:
             UsageError: If a limit is not positive.
         """
-        from leaderboard.engines import LocalEngine
-        from leaderboard.wall_clock import Limits
+        from leaderboard.running.wall_clock import Limits
+        from leaderboard.running.workers.local_engine import LocalEngine
 
         try:
             limits = Limits(
@@ -72,6 +72,6 @@ class EngineArguments:
             raise UsageError("--step-, --setup- and --route-timeout must be positive") from error
         if self.engine == "local":
             return LocalEngine(workers=self.workers, limits=limits)
-        from leaderboard.ray_engine import RayEngine
+        from leaderboard.running.workers.ray_engine import RayEngine
 
         return RayEngine(workers=self.workers, limits=limits, address=self.address)

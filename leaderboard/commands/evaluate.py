@@ -14,8 +14,8 @@ from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
 
 if TYPE_CHECKING:
-    from leaderboard.record import RunRecord
-    from leaderboard.runner import Existing
+    from leaderboard.records.record import RunRecord
+    from leaderboard.running.runner import Existing
 
 EVALUATE_HELP = """Drive an agent over routes and seeds, and print the leaderboard table.
 
@@ -63,9 +63,9 @@ class Evaluate(EngineArguments, SceneArguments):
         options, suite = self.choose(self.route_ids)
         folder = self.output or self._default_folder(suite.name)
 
-        from leaderboard.jobs import RunSpec, SetupError
-        from leaderboard.results import ResultsError
-        from leaderboard.runner import evaluate
+        from leaderboard.records.results import ResultsError
+        from leaderboard.running.jobs import RunSpec, SetupError
+        from leaderboard.running.runner import evaluate
 
         spec = RunSpec(
             agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
@@ -89,7 +89,7 @@ class Evaluate(EngineArguments, SceneArguments):
         return EXIT_CRASHED if run.lost else 0
 
     def _existing(self) -> Existing:
-        from leaderboard.runner import Existing
+        from leaderboard.running.runner import Existing
 
         if self.resume:
             return Existing.RESUME
@@ -117,8 +117,8 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _print_run(run: RunRecord, folder: Path) -> None:
-    from leaderboard.report import print_run
-    from leaderboard.results import CARLA_FILE, RECORD_FILE
+    from leaderboard.records.results import CARLA_FILE, RECORD_FILE
+    from leaderboard.tables.run_tables import print_run
 
     print_run(run, Console())
     say(

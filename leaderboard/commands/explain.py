@@ -12,7 +12,7 @@ from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.work_bar import work_bar
+from leaderboard.running.displays.work_bar import work_bar
 
 EXPLAIN_HELP = """Show why an agent drove a route as it did: one HTML page to look at.
 
@@ -28,7 +28,7 @@ the agent would have decided at the moment --at, and how it would have gone on f
 
 The agent drives the route again, compared with the record at every decision. One that cannot be
 looked into (no torch policy that names its tokens) still gets the replay, the prompt and what if.
-In Python: leaderboard.explaining.explain_route. See docs/explain_page.md."""
+In Python: leaderboard.explaining.route.explain_route. See docs/explain_page.md."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +64,8 @@ class Explain:
 
     def run(self) -> int:
         """Writes the page; returns the exit code."""
-        from leaderboard.chosen_route import RouteChoiceError, chosen_route
-        from leaderboard.results import ResultsError, read_run, run_folder
+        from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
+        from leaderboard.records.results import ResultsError, read_run, run_folder
 
         try:
             folder = run_folder(self.folder)
@@ -75,13 +75,14 @@ class Explain:
             raise UsageError(str(error)) from error
         run = dataclasses.replace(run, agent=self.agent or run.agent)
 
-        from di_envs.edit_text import EditError
-        from leaderboard.compiling import compile_progress
-        from leaderboard.explaining import explain_route
-        from leaderboard.explanation import ExplainError
+        from di_envs.edits.text import EditError
+        from leaderboard.explaining.explanation import ExplainError
+        from leaderboard.explaining.route import explain_route
+        from leaderboard.pages.explain_page import explain_page
         from leaderboard.pages.report_page import ReportError, write_report
-        from leaderboard.replay import ReplayError
-        from leaderboard.retracing import RetraceError
+        from leaderboard.replaying.replay import ReplayError
+        from leaderboard.replaying.retracing import RetraceError
+        from leaderboard.running.compiling import compile_progress
 
         console = Console(stderr=True)
         path = self.output or folder / f"explain-{self.route}.html"
@@ -99,7 +100,7 @@ class Explain:
                     ahead_s=self.ahead,
                     on_progress=lambda done, total: bar.update(task, completed=done, total=total),
                 )
-            size = write_report(path, explanation.to_html())
+            size = write_report(path, explain_page(explanation))
         except (EditError, ExplainError, ReplayError, ReportError, RetraceError) as error:
             raise UsageError(str(error)) from error
         say(*explanation.missing)

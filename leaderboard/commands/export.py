@@ -62,7 +62,7 @@ class Export:
 
         from agents.training.export import ExportConfig, shard_jobs, warm_up
         from agents.training.frames import DriveFileError
-        from leaderboard.compiling import compile_progress
+        from leaderboard.running.compiling import compile_progress
 
         try:
             config = ExportConfig(
@@ -89,8 +89,8 @@ class Export:
     def _export(self, jobs: list[ShardJob]) -> int | None:
         """Renders; returns how many moments there are, None if asked to stop."""
         from agents.training.export import export
-        from leaderboard.interruption import interruptible
-        from leaderboard.work_bar import work_bar
+        from leaderboard.running.displays.work_bar import work_bar
+        from leaderboard.running.interruption import interruptible
 
         moments = 0
         done = export(jobs, workers=self.workers)

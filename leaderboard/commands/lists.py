@@ -13,7 +13,7 @@ class Agents:
 
     def run(self) -> int:
         """Prints the list; returns the exit code."""
-        from leaderboard.listing import agent_table, scheme_table
+        from leaderboard.tables.lists import agent_table, scheme_table
 
         Console().print(
             agent_table(),
@@ -32,7 +32,7 @@ class Suites:
 
     def run(self) -> int:
         """Prints the list; returns the exit code."""
-        from leaderboard.listing import scenario_table, suite_table
+        from leaderboard.tables.lists import scenario_table, suite_table
 
         Console().print(
             suite_table(),

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, complain, say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.work_bar import work_bar
+from leaderboard.running.displays.work_bar import work_bar
 
 REPORT_HELP = """Write a run as one HTML page: tables, infractions on a map, replays of routes.
 
@@ -38,7 +38,7 @@ class Report:
 
     def run(self) -> int:
         """Writes the page; returns the exit code."""
-        from leaderboard.results import ResultsError, read_run, run_folder
+        from leaderboard.records.results import ResultsError, read_run, run_folder
 
         try:
             folder = run_folder(self.path)
@@ -46,13 +46,13 @@ class Report:
         except ResultsError as error:
             raise UsageError(str(error)) from error
 
-        from leaderboard.compiling import compile_progress
         from leaderboard.pages.report_page import (
             ReportError,
             chosen_routes,
             make_report,
             write_report,
         )
+        from leaderboard.running.compiling import compile_progress
 
         console = Console(stderr=True)
         path = self.output or folder / "report.html"

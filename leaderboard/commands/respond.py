@@ -13,10 +13,10 @@ from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.work_bar import work_bar
+from leaderboard.running.displays.work_bar import work_bar
 
 if TYPE_CHECKING:
-    from leaderboard.record import RouteRecord, RunRecord
+    from leaderboard.records.record import RouteRecord, RunRecord
     from leaderboard.responding.drive_responses import DriveResponses
 
 RESPOND_HELP = """Measure what a policy responds to over recorded drives: gradients and attention.
@@ -65,7 +65,7 @@ class Respond:
 
     def run(self) -> int:
         """Responds; returns the exit code."""
-        from leaderboard.results import ResultsError, read_run, run_folder
+        from leaderboard.records.results import ResultsError, read_run, run_folder
 
         if (self.route is None) == (not self.routes):
             raise UsageError("say which routes: --route ID for one, or --routes all, or --routes …")
@@ -113,10 +113,10 @@ class Respond:
     ) -> list[DriveResponses]:
         """Responses of every drive, behind a bar that counts seconds of driving."""
         from agents.explain.protocol import NotExplainableError
-        from leaderboard.compiling import compile_progress
-        from leaderboard.replay import ReplayError
+        from leaderboard.replaying.replay import ReplayError
+        from leaderboard.replaying.retracing import RetraceError
         from leaderboard.responding.measuring import measured
-        from leaderboard.retracing import RetraceError
+        from leaderboard.running.compiling import compile_progress
 
         if self.agent is not None:
             run = dataclasses.replace(run, agent=self.agent)
@@ -138,9 +138,9 @@ class Respond:
 
     def _written(self, target: Path, drives: list[DriveResponses]) -> list[Path]:
         """Figures and tables; the tables are printed too."""
+        from leaderboard.pages.response_figures import situation_figure, write_figures
         from leaderboard.responding.moments import marked_moments, moment_name
-        from leaderboard.responding.response_figures import situation_figure, write_figures
-        from leaderboard.responding.response_tables import tables_of, write_tables
+        from leaderboard.tables.response_tables import tables_of, write_tables
 
         console = Console()
         tables = tables_of(drives)

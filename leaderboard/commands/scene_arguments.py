@@ -69,8 +69,8 @@ class SceneArguments:
         """
         if not self.intervene.strip():
             return ()
-        from di_envs.edit_text import EditError
-        from leaderboard.interventions import read_interventions
+        from di_envs.edits.text import EditError
+        from leaderboard.running.interventions import read_interventions
 
         try:
             return read_interventions(self.intervene)

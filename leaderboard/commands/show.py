@@ -26,8 +26,8 @@ class Show:
 
     def run(self) -> int:
         """Prints the table; returns the exit code."""
-        from leaderboard.report import print_run
-        from leaderboard.results import ResultsError, read_run
+        from leaderboard.records.results import ResultsError, read_run
+        from leaderboard.tables.run_tables import print_run
 
         try:
             run = read_run(self.folder)

@@ -38,8 +38,8 @@ class StudyArguments(EngineArguments, SceneArguments):
 
     def run(self) -> int:
         """Drives the study, or shows one; returns the exit code."""
-        from leaderboard.jobs import SetupError
-        from leaderboard.results import ResultsError
+        from leaderboard.records.results import ResultsError
+        from leaderboard.running.jobs import SetupError
         from leaderboard.studies.study_error import StudyError
 
         try:
@@ -87,9 +87,9 @@ class StudyArguments(EngineArguments, SceneArguments):
         name = f"{self.kind()}-{plain_name(self.agent)}-{plain_name(suite.name)}"
         folder = self.output or Path("results") / name.replace(" ", "-")
 
-        from leaderboard.jobs import RunSpec
+        from leaderboard.pages.study_files import keep_study
+        from leaderboard.running.jobs import RunSpec
         from leaderboard.studies.driving import StudyPlan, drive_study
-        from leaderboard.studies.results import keep_study
 
         spec = RunSpec(
             agent=self.agent, options=options, rules=self.rules, interventions=self.edits()

@@ -21,12 +21,12 @@ from leaderboard.commands.scene_arguments import says
 if TYPE_CHECKING:
     from agents.driveinsight.config import PolicyConfig
     from agents.driveinsight.model import Policy
+    from agents.training.config import TrainConfig
     from agents.training.distributed import Team
+    from agents.training.learning import Training
     from agents.training.loading import Moments
-    from agents.training.train_config import TrainConfig
-    from agents.training.training import Training
-    from agents.training.training_loop import Checks
-    from leaderboard.training_display import TrainingDisplay
+    from agents.training.loop import Checks
+    from leaderboard.running.displays.training import TrainingDisplay
 
 TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
 
@@ -113,12 +113,12 @@ class Train:
         self._check_numbers()
 
         from agents.driveinsight.weights import WeightsError
+        from agents.training.config import TrainingError
         from agents.training.distributed import joined_team
         from agents.training.frames import DriveFileError
+        from agents.training.learning import Training
         from agents.training.loading import load_moments
-        from agents.training.train_config import TrainingError
-        from agents.training.training import Training
-        from leaderboard.training_check import CheckError
+        from leaderboard.running.training_check import CheckError
 
         torch.set_num_threads(self.threads)
         try:
@@ -150,7 +150,7 @@ class Train:
 
     def _training_config(self, team: Team) -> TrainConfig:
         from agents.driveinsight.weights import weights_digest
-        from agents.training.train_config import TrainConfig
+        from agents.training.config import TrainConfig
 
         return TrainConfig(
             steps=self.steps,
@@ -170,10 +170,10 @@ class Train:
     def _train(self, training: Training, moments: Moments) -> int:
         from agents.training.collect import data_card
         from agents.training.loading import Samples, batches
-        from agents.training.training_loop import train
-        from leaderboard.compiling import compile_progress
-        from leaderboard.interruption import interruptible
-        from leaderboard.training_display import TrainingDisplay
+        from agents.training.loop import train
+        from leaderboard.running.compiling import compile_progress
+        from leaderboard.running.displays.training import TrainingDisplay
+        from leaderboard.running.interruption import interruptible
 
         policy, config, team = training.policy.config, training.config, training.team
         folder = self.output or Path("runs") / policy.name
@@ -206,7 +206,7 @@ class Train:
     def _go_on(self, training: Training, folder: Path) -> None:
         """Goes on with the training that the folder holds, or with another policy's weights."""
         from agents.driveinsight.weights import take_weights
-        from agents.training.training_loop import CHECKPOINT_FILE
+        from agents.training.loop import CHECKPOINT_FILE
 
         if (folder / CHECKPOINT_FILE).exists():
             training.load(folder / CHECKPOINT_FILE)
@@ -240,8 +240,8 @@ class Train:
     def _checks(
         self, training: Training, show: TrainingDisplay, stop: Callable[[], bool]
     ) -> Iterator[Checks | None]:
-        from agents.training.training_loop import Checks
-        from leaderboard.training_check import ClosedLoopCheck
+        from agents.training.loop import Checks
+        from leaderboard.running.training_check import ClosedLoopCheck
 
         if not self.check_routes or self.overfit or not training.team.first:
             yield None
@@ -297,8 +297,8 @@ def _tell_stopped(training: Training) -> int:
 
 
 def _tell(training: Training, folder: Path) -> int:
-    from agents.training.train_log import HELD_OUT, read_rows, write_curve
-    from agents.training.training_loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
+    from agents.training.log import HELD_OUT, read_rows, write_curve
+    from agents.training.loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     log, checked = read_rows(folder / LOG_FILE), read_rows(folder / CHECKS_FILE)
     curve = folder / "curve.png"

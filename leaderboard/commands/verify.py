@@ -11,11 +11,11 @@ from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_REFUTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.work_bar import work_bar
+from leaderboard.running.displays.work_bar import work_bar
 
 if TYPE_CHECKING:
-    from leaderboard.record import RunRecord
-    from leaderboard.verify import Verdict
+    from leaderboard.records.record import RunRecord
+    from leaderboard.replaying.verify import Verdict
 
 VERIFY_HELP = """Replay a run without its policy, and say whether its claim stands.
 
@@ -48,10 +48,10 @@ class Verify:
         if self.workers < 1:
             raise UsageError("--workers must be at least 1")
 
-        from leaderboard.compiling import compile_progress
-        from leaderboard.replay import ReplayError
-        from leaderboard.results import ResultsError, read_run, run_folder
-        from leaderboard.verify import verify_run
+        from leaderboard.records.results import ResultsError, read_run, run_folder
+        from leaderboard.replaying.replay import ReplayError
+        from leaderboard.replaying.verify import verify_run
+        from leaderboard.running.compiling import compile_progress
 
         console = Console(stderr=True)
         try:
@@ -98,7 +98,7 @@ def verdict_lines(verdict: Verdict, run: RunRecord, *, seen: bool) -> list[str]:
 
 
 def _conclusion(verdict: Verdict, run: RunRecord, *, seen: bool) -> str:
-    from leaderboard.score import mean_score
+    from leaderboard.scoring.score import mean_score
 
     driving, completion, penalty = mean_score([record.score for record in run.scored])
     claim = f"DS {driving:.2f}, RC {completion:.2f}, IS {penalty:.3f} under {run.rules}"

@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.prompt import COMPONENTS
-from di_envs.sensors.camera_config import CameraConfig
+from di_envs.sensors.camera.config import CameraConfig
 from di_envs.town.plan import RoadOption
 from di_envs.world.state import TICK_S
-from leaderboard.explanation import Answer, Explanation, WhatIf
-from leaderboard.footing import footing_differences, footing_here, footing_of
-from leaderboard.pages.blocks import Column, write_block
+from leaderboard.explaining.explanation import Answer, Explanation, WhatIf
 from leaderboard.pages.explain_tables import answers_table, telling_events
 from leaderboard.pages.looks import look_columns, map_columns
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
@@ -29,8 +27,10 @@ from leaderboard.pages.report_page import event_heads, film_meta, player_parts
 from leaderboard.pages.report_tables import event_text, facts_table
 from leaderboard.pages.told import told_columns
 from leaderboard.pages.town_svg import town_svg
-from leaderboard.record import RunRecord
-from leaderboard.retracing import FRONT
+from leaderboard.records.blocks import Column, write_block
+from leaderboard.records.footing import footing_differences, footing_here, footing_of
+from leaderboard.records.record import RunRecord
+from leaderboard.replaying.retracing import FRONT
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-explanation", 1
 SCRIPTS = (
@@ -40,8 +40,18 @@ SCRIPTS = (
 FRAME_PX = 980  # height of the page in a notebook
 
 
-def explain_page(explanation: Explanation) -> str:
-    """The page's text."""
+class Page(str):
+    """A page's text, which a notebook shows in a frame of its own."""
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self)}" style="width: 100%; height: {FRAME_PX}px; border: 0" '
+            'sandbox="allow-scripts" title="DriveInsight explanation"></iframe>'
+        )
+
+
+def explain_page(explanation: Explanation) -> Page:
+    """One self-contained page: see `docs/explain_page.md`."""
     run, record = explanation.run, explanation.record
     blocks = dict(_blocks(explanation))
     score = record.score
@@ -50,7 +60,7 @@ def explain_page(explanation: Explanation) -> str:
         f"driving score {score.driving_score:.1f} = {score.route_completion:.1f} x "
         f"{score.infraction_score:.2f} · rules {run.rules} · {run.town}"
     )
-    return Template(static_text("explain.html")).substitute(
+    text = Template(static_text("explain.html")).substitute(
         title=joined([f"{run.title}, route {record.route_id}"]),
         subtitle=joined([facts]),
         style=static_text("style.css") + static_text("explain.css"),
@@ -66,14 +76,7 @@ def explain_page(explanation: Explanation) -> str:
         ),
         scripts=joined(element("script", Markup("\n" + static_text(name))) for name in SCRIPTS),
     )
-
-
-def framed(page: str) -> str:
-    """A page in a frame of its own, as HTML that can stand within another page."""
-    return (
-        f'<iframe srcdoc="{escape(page)}" style="width: 100%; height: {FRAME_PX}px; border: 0" '
-        'sandbox="allow-scripts" title="DriveInsight explanation"></iframe>'
-    )
+    return Page(text)
 
 
 def _notes(explanation: Explanation) -> Iterator[str]:

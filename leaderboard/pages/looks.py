@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.world.state import TICK_S
-from leaderboard.explanation import ActivationMaps, Explanation
-from leaderboard.pages.blocks import Column
-from leaderboard.pages.film import SHARE_STEP
+from leaderboard.explaining.explanation import ActivationMaps, Explanation
+from leaderboard.records.blocks import Column
+from leaderboard.replaying.film import SHARE_STEP
 
 _FINE = 2.0**-16  # of the largest gradient: what one is rounded to
 _SHARE_STEP = 2.0**-12  # of a share of attention

@@ -10,7 +10,7 @@ from di_envs.town.town import Town
 from leaderboard.pages.markup import Markup, element
 from leaderboard.pages.report_tables import event_text, met, shown_events
 from leaderboard.pages.town_svg import CM, line_path, simplified, town_bounds, town_svg
-from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.records.record import RouteRecord, RunRecord
 
 
 def map_svg(run: RunRecord, records: Sequence[RouteRecord], town: Town) -> Markup:

@@ -19,9 +19,6 @@ from di_envs.route_env import RouteEnv
 from di_envs.town.town import Town
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import TICK_S
-from leaderboard.footing import footing_differences, footing_here, footing_of
-from leaderboard.pages.blocks import write_block
-from leaderboard.pages.film import Film, film_of
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
 from leaderboard.pages.report_map import map_svg
 from leaderboard.pages.report_tables import (
@@ -33,8 +30,11 @@ from leaderboard.pages.report_tables import (
     shown_events,
     summary_cards,
 )
-from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.replay import ReplayError, ReplayStep, replay, replay_env
+from leaderboard.records.blocks import write_block
+from leaderboard.records.footing import footing_differences, footing_here, footing_of
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.replaying.film import Film, film_of
+from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay_env
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-report", 1
 SCRIPTS = (

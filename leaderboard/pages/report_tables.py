@@ -6,18 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 
 from di_envs.world.kinds import EventKind
-from leaderboard.confidence import mean_interval
 from leaderboard.pages.markup import Cell, Content, Heading, Markup, TableOf, element, joined
-from leaderboard.record import EventRecord, RouteRecord, RunRecord
-from leaderboard.report import (
-    SCENARIO_NAMES,
-    SHORT_NAMES,
+from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
+from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
+from leaderboard.scoring.rules import rules_named
+from leaderboard.statistics.confidence import mean_interval
+from leaderboard.tables.run_tables import (
     mean_bound,
     scored_per_km,
     seed_means,
     summary,
 )
-from leaderboard.rules import rules_named
 
 ROUTE_HEADINGS = (
     Heading(name="route"),
@@ -58,7 +57,7 @@ def event_text(event: EventRecord) -> str:
         return f"outside lanes for {event.value:.1f} m"
     if event.kind == EventKind.MIN_SPEED:
         return f"at {event.value:.0f} % of the traffic's pace"
-    return SHORT_NAMES[event.kind]
+    return EVENT_NAMES[event.kind]
 
 
 def met(event: EventRecord) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.pages.blocks import Column
-from leaderboard.pages.film import ANGLE_STEP, METRE_STEP, SPEED_STEP
+from leaderboard.records.blocks import Column
+from leaderboard.replaying.film import ANGLE_STEP, METRE_STEP, SPEED_STEP
 
 _SAME_M = 0.1  # polylines that agree to this are one
 _ASIDE_M = 0.0371  # towns are drawn in round numbers: none of them shall lie where rounding turns

@@ -13,9 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.drawing import BRIDGE_M, SURFACE, Array, crosswalk_bars, stop_line_ends, surfaces
-from di_envs.map_chunks import MapKind, build_map_chunks
+from di_envs.drawing.outlines import (
+    BRIDGE_M,
+    SURFACE,
+    Array,
+    crosswalk_bars,
+    stop_line_ends,
+    surfaces,
+)
 from di_envs.town.lanes import SignalKind
+from di_envs.town.map_chunks import MapKind, build_map_chunks
 from di_envs.town.town import Town
 
 CM = 100.0

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.resampling import Interval, clustered, mean_interval, ratio_interval
 from leaderboard.responding.claims import common_groups
 from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.statistics.resampling import Interval, clustered, mean_interval, ratio_interval
 
 MEASURES = ("Gx", "Gy", "strength", "share")
 

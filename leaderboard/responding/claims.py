@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.resampling import Interval, clustered, ratio_interval
 from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.statistics.resampling import Interval, clustered, ratio_interval
 
 LEVEL = 0.95  # of all claims together
 SLIGHT = 1.1  # a rise of less than a tenth is none

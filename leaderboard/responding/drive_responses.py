@@ -15,10 +15,10 @@ from agents.base import Agent
 from agents.explain.responses import Response, responses_at
 from agents.explain.situations import SITUATIONS, situations_of
 from di_envs.route_env import RouteEnv
-from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.report import SHORT_NAMES
-from leaderboard.retracing import RetraceError, retrace, retrace_env
-from leaderboard.rules import rules_named
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env
+from leaderboard.scoring.names import EVENT_NAMES
+from leaderboard.scoring.rules import rules_named
 
 EVERY_S = 0.5  # between two moments that are looked at, unless told otherwise
 
@@ -153,7 +153,7 @@ def drive_hash(record: RouteRecord) -> str:
 
 def _events(run: RunRecord, record: RouteRecord) -> tuple[tuple[float, str], ...]:
     counted = rules_named(run.rules).infractions
-    return tuple((e.time_s, SHORT_NAMES[e.kind]) for e in record.events if e.kind in counted)
+    return tuple((e.time_s, EVENT_NAMES[e.kind]) for e in record.events if e.kind in counted)
 
 
 def _stacked(responses: list[Response], name: str) -> NDArray[np.float32]:

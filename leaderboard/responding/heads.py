@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.resampling import Interval, clustered, mean_interval
 from leaderboard.responding.claims import FAILS, HOLDS, OPEN
 from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.statistics.resampling import Interval, clustered, mean_interval
 
 _SLIGHT_EXCESS = 0.1  # a smaller difference of correlations is none
 

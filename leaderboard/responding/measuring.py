@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from agents.explain.protocol import explainable
-from leaderboard.episode import close_agent
-from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.replaying.retracing import retrace_env, run_agent
 from leaderboard.responding.drive_responses import DriveResponses, drive_hash, drive_responses
 from leaderboard.responding.response_files import (
     ResponseFileError,
@@ -15,7 +15,7 @@ from leaderboard.responding.response_files import (
     responses_file,
     write_responses,
 )
-from leaderboard.retracing import retrace_env, run_agent
+from leaderboard.running.episode import close_agent
 
 
 def measured(

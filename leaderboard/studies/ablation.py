@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from di_envs.world.kinds import EventKind
-from leaderboard.rules import rules_named
-from leaderboard.score import infractions_per_km
+from leaderboard.scoring.rules import rules_named
+from leaderboard.scoring.score import infractions_per_km
 from leaderboard.studies.effects import (
     ALPHA,
     EQUIVALENT,

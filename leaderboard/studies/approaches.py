@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 
 from di_envs.route_env import RouteEnv
 from di_envs.town.lanes import LightState
-from leaderboard.bound import PerfectDriver, StopPoint, stop_points
-from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.replay import replay
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.replaying.replay import replay
+from leaderboard.running.bound import PerfectDriver, StopPoint, stop_points
 from leaderboard.studies.effects import Effect, share_effect
 from leaderboard.studies.experiments import Judgement, Verdict
 from leaderboard.studies.numbers import effect_numbers, span_text

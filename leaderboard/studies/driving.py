@@ -19,22 +19,27 @@ from gymnasium import spaces
 from rich.console import Console
 
 from agents import load_agent
-from di_envs.edit_text import EditError, read_edit
+from di_envs.edits.text import EditError, read_edit
 from di_envs.suites import Suite
-from leaderboard.compiling import compile_progress
-from leaderboard.engines import Engine, LocalEngine
-from leaderboard.episode import close_agent
-from leaderboard.folder_lock import folder_lock
-from leaderboard.interruption import interruptible
-from leaderboard.interventions import check_interventions, read_interventions, sort_interventions
-from leaderboard.jobs import RunSpec, plan_jobs
-from leaderboard.messages import Scene
-from leaderboard.record import RouteRecord, RunRecord
-from leaderboard.results import RECORD_FILE, DamagedError, read_head
-from leaderboard.resuming import resumed
-from leaderboard.runner import Existing, evaluate, new_run
-from leaderboard.setting_up import scene_of, set_up
-from leaderboard.studies.display import StudyDisplay
+from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
+from leaderboard.records.resuming import resumed
+from leaderboard.running.compiling import compile_progress
+from leaderboard.running.displays.study import StudyDisplay
+from leaderboard.running.episode import close_agent
+from leaderboard.running.interruption import interruptible
+from leaderboard.running.interventions import (
+    check_interventions,
+    read_interventions,
+    sort_interventions,
+)
+from leaderboard.running.jobs import RunSpec, plan_jobs
+from leaderboard.running.messages import Scene
+from leaderboard.running.runner import Existing, evaluate, new_run
+from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.wall_clock import Stopwatch
+from leaderboard.running.workers.local_engine import Engine, LocalEngine
 from leaderboard.studies.more_seeds import recover_run, replace_run, with_seeds
 from leaderboard.studies.record import Drive, DrivenRow, Study, study_of
 from leaderboard.studies.rows import (
@@ -48,7 +53,6 @@ from leaderboard.studies.rows import (
 )
 from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, as_read, read_study
-from leaderboard.wall_clock import Stopwatch
 from wrappers.interventions.layout import SHORT_NAMES
 
 ROWS_FOLDER = "rows"

@@ -27,8 +27,8 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.bootstrap import clustered_mean, resampled_means
-from leaderboard.confidence import t_quantile
+from leaderboard.statistics.bootstrap import clustered_mean, resampled_means
+from leaderboard.statistics.confidence import t_quantile
 
 MARGIN_DS = 5.0  # a smaller difference of driving scores is of no importance
 ALPHA = 0.05  # of all rows together

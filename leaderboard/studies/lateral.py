@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from di_envs.town.plan import RoutePlan
-from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.studies.effects import Effect, effect
 from leaderboard.studies.experiments import LATERAL_M, MOVED, Judgement, Verdict
 from leaderboard.studies.numbers import effect_numbers, span_text

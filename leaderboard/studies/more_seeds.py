@@ -12,9 +12,9 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from leaderboard.jobs import plan_jobs
-from leaderboard.record import RunRecord
-from leaderboard.results import write_run
+from leaderboard.records.record import RunRecord
+from leaderboard.records.results import write_run
+from leaderboard.running.jobs import plan_jobs
 
 
 def with_seeds(run: RunRecord, route_ids: Sequence[str], seeds: Sequence[int]) -> RunRecord:

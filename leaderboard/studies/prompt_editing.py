@@ -9,9 +9,10 @@ from typing import Any
 
 from rich.console import Console
 
-from leaderboard.record import RunRecord
-from leaderboard.replay import ReplayError, replay_env
-from leaderboard.results import RECORD_FILE, read_run
+from leaderboard.records.record import RunRecord
+from leaderboard.records.results import RECORD_FILE, read_run
+from leaderboard.replaying.replay import ReplayError, replay_env
+from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.studies.approaches import Approach, approaches, judge_lights
 from leaderboard.studies.experiments import Experiment, Judgement, Verdict
 from leaderboard.studies.failures import judge_bev, judge_map
@@ -20,7 +21,6 @@ from leaderboard.studies.record import Study
 from leaderboard.studies.rows import BASELINE
 from leaderboard.studies.speed_sweep import judge_speed, sweep
 from leaderboard.studies.study_error import StudyError
-from leaderboard.work_bar import work_bar
 
 JUDGEMENTS, MISSING = "judgements", "missing"  # in a study's `extra`
 

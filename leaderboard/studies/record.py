@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from leaderboard.record import RouteRecord, RunRecord
+from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.studies.rows import BASELINE, NULL, Row
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.plan import RoutePlan
-from leaderboard.record import TraceRow
+from leaderboard.records.record import TraceRow
 
 _AHEAD, _BEHIND = 60, 5  # route points among which the next place is looked for
 _OTHER_WAY_M = 10.0  # a point where the route goes the other way counts as so much further off

@@ -21,15 +21,15 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from agents.one_thread import one_thread
-from leaderboard.episode import close_agent
-from leaderboard.record import RouteRecord
-from leaderboard.results import read_run, replace_file
-from leaderboard.retracing import own_space, retrace, retrace_env, run_agent
+from leaderboard.records.record import RouteRecord
+from leaderboard.records.results import read_run, replace_file
+from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
+from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.episode import close_agent
 from leaderboard.studies.effects import ALPHA, Effect, effect, interval
 from leaderboard.studies.experiments import Judgement, Verdict
 from leaderboard.studies.numbers import effect_numbers, span_text
 from leaderboard.studies.study_error import StudyError
-from leaderboard.work_bar import work_bar
 from wrappers.interventions.editing import ObservationEditing
 
 DOSES_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0)
@@ -94,8 +94,8 @@ def ask_about(folder: Path, index: int) -> None:
     import torch
 
     from agents.explain.protocol import NotExplainableError, explainable
-    from leaderboard.replay import ReplayError
-    from leaderboard.retracing import RetraceError
+    from leaderboard.replaying.replay import ReplayError
+    from leaderboard.replaying.retracing import RetraceError
 
     run = read_run(folder / "rows" / "baseline")
     record = next(record for record in run.routes if record.index == index)

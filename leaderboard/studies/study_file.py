@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from leaderboard.results import replace_file
+from leaderboard.records.results import replace_file
 from leaderboard.studies.record import Drive, DrivenRow, Study
 from leaderboard.studies.rows import Row
 from leaderboard.studies.study_error import StudyError

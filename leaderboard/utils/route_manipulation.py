@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from di_envs.town.router import target_indices
+from di_envs.town.routing.router import target_indices
 
 
 def downsample_route(route: Sequence[tuple[Any, Any]], sample_factor: float) -> list[int]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from di_envs.world.kinds import EventKind
-from leaderboard.record import Bound, EventRecord, RouteRecord, RunRecord
-from leaderboard.score import Score
+from leaderboard.records.record import Bound, EventRecord, RouteRecord, RunRecord
+from leaderboard.scoring.score import Score
 
 
 def event(kind: EventKind, **fields: object) -> EventRecord:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from agents.base import Requirements
-from leaderboard.jobs import Job
+from leaderboard.running.jobs import Job
 
 FOR_EVER_S = 3600.0
 BRAKE = np.array([0.0, 0.0, 1.0], dtype=np.float32)

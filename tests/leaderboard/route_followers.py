@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from agents.base import Requirements, make_control
-from agents.controllers import ControllerMemory, WaypointControllerConfig, waypoints_to_control
+from di_envs.actions.controllers import (
+    ControllerMemory,
+    WaypointControllerConfig,
+    waypoints_to_control,
+)
 from di_envs.prompt import COMPONENTS
 
 _CONFIG = WaypointControllerConfig()

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.wrappers import RescaleAction
 
 import di_envs
-from di_envs.action_forms import FORMS, form_of, pedal_to_control, rescaled
+from di_envs.actions.forms import FORMS, form_of, pedal_to_control, rescaled
 from di_envs.testing import check_environment
 from wrappers.actions import PedalWrapper, WaypointWrapper, pedal_vector
 from wrappers.vectors import VectorObservations

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import di_envs
-from di_envs.edit_text import EditError
+from di_envs.edits.text import EditError
 from di_envs.multi_ego import MultiEgoEnv
 from di_envs.route_env import RouteEnv
 from di_envs.testing import check_environment

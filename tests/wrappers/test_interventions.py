@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from di_envs.edit_conditions import Condition
-from di_envs.edit_text import EditError
+from di_envs.edits.conditions import Condition
+from di_envs.edits.text import EditError
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
 from di_envs.route_env import RouteEnv

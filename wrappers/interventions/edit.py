@@ -24,9 +24,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from di_envs.edit_conditions import ALWAYS, Condition, number_text
-from di_envs.edit_text import EditError, EditText
-from di_envs.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
+from di_envs.edits.conditions import ALWAYS, Condition, number_text
+from di_envs.edits.text import EditError, EditText
+from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 from wrappers.interventions.context import EditContext
 
 Observation = Mapping[str, Any]

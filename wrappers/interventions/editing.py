@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from di_envs.edit_conditions import UNITS
-from di_envs.edit_text import EditError
+from di_envs.edits.conditions import UNITS
+from di_envs.edits.text import EditError
 from wrappers.interventions.context import EditContext
 from wrappers.interventions.edit import Observation, ObservationEdit
 from wrappers.interventions.layout import beside, names_in

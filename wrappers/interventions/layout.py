@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from di_envs.config import check_name
-from di_envs.edit_text import EditError
+from di_envs.edits.text import EditError
 
 # Columns of the tables, as `observation_space` lays them out
 COLUMNS: Mapping[str, tuple[str, ...]] = MappingProxyType(

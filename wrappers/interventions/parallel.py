@@ -9,7 +9,7 @@ from typing import Any
 from pettingzoo.utils.wrappers import BaseParallelWrapper
 
 from di_envs.config import check_name
-from di_envs.edit_text import EditError
+from di_envs.edits.text import EditError
 from di_envs.multi_ego import MultiEgoEnv, MultiEgoSnapshot
 from wrappers.interventions.context import context_of
 from wrappers.interventions.edit import ObservationEdit

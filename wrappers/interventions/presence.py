@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from di_envs.edit_text import EditError
+from di_envs.edits.text import EditError
 from di_envs.prompt import COMPONENTS
 from wrappers.interventions.context import EditContext
 from wrappers.interventions.edit import Draws, Observation, ObservationEdit

@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Mapping
 
 from di_envs.config import check_name
-from di_envs.edit_text import EditError, EditText, read_edits
+from di_envs.edits.text import EditError, EditText, read_edits
 from wrappers.interventions.edit import ObservationEdit
 from wrappers.interventions.losing import Blackout, Delay, Mask, Thin
 from wrappers.interventions.presence import Clear, Drop, Identity, Zero

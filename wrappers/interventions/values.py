@@ -15,8 +15,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from di_envs.config import check_name
-from di_envs.edit_conditions import Condition, number_text
-from di_envs.edit_text import EditError, EditText
+from di_envs.edits.conditions import Condition, number_text
+from di_envs.edits.text import EditError, EditText
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from wrappers.interventions.context import EditContext

@@ -1,5 +1,5 @@
 "use strict";
-// Reads blocks: columns of numbers that leaderboard/pages/blocks.py packed.
+// Reads blocks: columns of numbers that leaderboard/records/blocks.py packed.
 //
 // di.blocks.read(text) -> Promise of {meta, columns: {name: Float64Array}}
 

@@ -9,9 +9,9 @@ from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets
 from agents.driveinsight.model import Inputs, Output
 from agents.driveinsight.semantics import BevClass
-from di_envs.map_chunks import POINTS
 from di_envs.prompt import LIGHTS, MAP_POLYLINES, OBSTACLES, ROUTING_POINTS, STOP_SIGNS
-from di_envs.sensors.camera_config import rig_of
+from di_envs.sensors.camera.config import rig_of
+from di_envs.town.map_chunks import POINTS
 
 
 def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int = 600) -> Inputs:

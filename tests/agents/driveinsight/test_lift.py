@@ -10,7 +10,7 @@ import torch
 
 from agents.driveinsight.config import CameraEncoderConfig, GridConfig
 from agents.driveinsight.lift import FrustumPooling, cells_of, depths_m, frustum_points
-from di_envs.sensors.camera_config import CameraConfig, Rig
+from di_envs.sensors.camera.config import CameraConfig, Rig
 
 # 64 x 32 pixels, 90 degrees: focal length 32 px, so 4 px are 1/8 m a metre ahead.
 CAMERA = CameraConfig(name="camera_front", width=64, height=32, fov_deg=90.0, x_m=1.0, z_m=2.0)

@@ -6,7 +6,6 @@ import dataclasses
 
 import pytest
 import torch
-from random_inputs import random_inputs, random_targets, sample
 
 from agents.driveinsight.config import (
     CONFIGS,
@@ -22,6 +21,7 @@ from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
 from agents.driveinsight.taps import editing, tap_names, watching
 from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
+from tests.agents.driveinsight.random_inputs import random_inputs, random_targets, sample
 
 SMALL = ["small", "small-without-cameras", "small-without-lidar", "small-prompt-only"]
 

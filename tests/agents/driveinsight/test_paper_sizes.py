@@ -7,11 +7,11 @@ import os
 
 import pytest
 import torch
-from random_inputs import random_inputs, random_targets
 
 from agents.driveinsight.config import config_named
 from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
+from tests.agents.driveinsight.random_inputs import random_inputs, random_targets
 
 MEMORY_BYTES = 8e9  # 6 GB at most were seen
 

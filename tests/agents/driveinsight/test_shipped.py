@@ -5,8 +5,8 @@ from __future__ import annotations
 from agents.driveinsight.agent import SHIPPED, requirements_of
 from agents.driveinsight.config import config_named
 from agents.driveinsight.weights import CARD_FILE, from_pretrained
-from leaderboard.driver import Driver
-from leaderboard.jobs import Job, RunSpec
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import Job, RunSpec
 
 
 def test_the_shipped_weights_are_of_the_configuration_small():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from random_inputs import random_inputs
 
 from agents.driveinsight.agent import DriveInsightAgent
 from agents.driveinsight.config import config_named
@@ -14,9 +13,10 @@ from agents.driveinsight.model import Policy
 from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
 from agents.driveinsight.taps import editing, watching
 from agents.driveinsight.weights import save_pretrained
-from di_envs.edit_text import EditError, read_edits
+from di_envs.edits.text import EditError, read_edits
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
+from tests.agents.driveinsight.random_inputs import random_inputs
 from wrappers.interventions import ObservationEditing
 from wrappers.interventions.context import EditContext
 

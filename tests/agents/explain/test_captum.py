@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import torch
 from captum import attr
-from small_policy import agent_of, moment_of, save_policy
 from torch import nn
 
 from agents.explain.activation import activation_maps
 from agents.explain.responses import token_gradients
+from tests.agents.explain.small_policy import agent_of, moment_of, save_policy
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from small_policy import CONFIG, agent_of, moment_of, save_policy
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.explain.activation import activation_maps
 from agents.explain.look import look_at
 from agents.explain.responses import responses_at, token_gradients
-from di_envs.edit_text import read_edits
+from di_envs.edits.text import read_edits
+from tests.agents.explain.small_policy import CONFIG, agent_of, moment_of, save_policy
 
 
 @pytest.fixture(scope="module")

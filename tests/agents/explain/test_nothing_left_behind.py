@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 from torch import nn
-from toy_policies import LinearNet, ToyAgent
 
 from agents.explain.look import look_at
 from agents.explain.protocol import Anatomy, NotExplainableError, TokenGroup
 from agents.explain.randomisation import shuffled
 from agents.explain.responses import responses_at
+from tests.agents.explain.toy_policies import LinearNet, ToyAgent
 
 SEEN = {"way": torch.ones(1, 2), "others": torch.ones(1, 2, 2)}
 ANATOMY = Anatomy(groups={"way": TokenGroup(tap="way"), "others": TokenGroup(tap="others")})

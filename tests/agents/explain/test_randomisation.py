@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from small_policy import agent_of, moment_of, save_policy
 
 from agents.explain.randomisation import randomisation_check, rank_correlation
+from tests.agents.explain.small_policy import agent_of, moment_of, save_policy
 
 
 def test_rank_correlation_by_hand():

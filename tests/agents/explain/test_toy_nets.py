@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import torch
 from torch import nn
-from toy_policies import LinearNet, ToyAgent
 
 from agents.explain.activation import activation_map, activation_maps
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
 from agents.explain.responses import responses_at, token_gradients
+from tests.agents.explain.toy_policies import LinearNet, ToyAgent
 
 SEEN = {"way": torch.ones(1, 2), "others": torch.ones(1, 2, 2)}
 GROUPS = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import Scene, toy_plan, toy_town
 
 from agents.driveinsight.config import GridConfig
 from agents.driveinsight.semantics import BevClass
@@ -12,6 +11,7 @@ from agents.training.bev_teacher import bev_semantics
 from di_envs.town.lanes import LightState
 from di_envs.world.state import ActorKind
 from di_envs.world.world import WorldView
+from tests.hand_made import Scene, toy_plan, toy_town
 
 GRID = GridConfig()  # 48 x 48 cells of 0.8 m, from 8 m behind and 19.2 m to the left
 LANE_Y = -44.75  # of an eastward lane to the stop line of head 0 at x = -15

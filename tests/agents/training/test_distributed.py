@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 import torch
-from small_policies import PROMPT_ONLY
 
+from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team, joined_team
+from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments, order
-from agents.training.train_config import TrainConfig
-from agents.training.training import Training
-from agents.training.training_loop import CHECKPOINT_FILE, train
+from agents.training.loop import CHECKPOINT_FILE, train
+from tests.agents.training.small_policies import PROMPT_ONLY
 
 TWO = TrainConfig(steps=6, batch=4, warm_up=2, processes=2, held_out=0.5)
 

@@ -24,7 +24,7 @@ from agents.training.waypoints import expert_waypoints
 from di_envs.observation import Observer
 from di_envs.route_env import RouteEnv
 
-SAME = "agents.expert:Expert"  # under another name: a learner that needs no correction
+SAME = "agents.expert.agent:Expert"  # under another name: a learner that needs no correction
 IDLE = "learners:Idle"
 GROUPS = ("camera", "lidar", "prompt", "odometry")
 

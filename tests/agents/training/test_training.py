@@ -7,7 +7,6 @@ import math
 
 import pytest
 import torch
-from small_policies import PROMPT_ONLY, SEEING
 
 from agents.driveinsight.losses import losses
 from agents.driveinsight.model import Policy
@@ -19,14 +18,12 @@ from agents.driveinsight.weights import (
     weights_digest,
 )
 from agents.training.collect import drive_paths
+from agents.training.config import TrainConfig, TrainingError
 from agents.training.frames import DriveFileError, read_drive
+from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments
-from agents.training.look import look
-from agents.training.samples import batch_of, hidden_components
-from agents.training.train_config import TrainConfig, TrainingError
-from agents.training.train_log import HELD_OUT, forget_rows_after, read_rows, write_curve
-from agents.training.training import Training
-from agents.training.training_loop import (
+from agents.training.log import HELD_OUT, forget_rows_after, read_rows, write_curve
+from agents.training.loop import (
     CHECKPOINT_FILE,
     CHECKS_FILE,
     LOG_FILE,
@@ -34,7 +31,10 @@ from agents.training.training_loop import (
     Checks,
     train,
 )
+from agents.training.predictions import look
+from agents.training.samples import batch_of, hidden_components
 from agents.training.waypoints import expert_waypoints
+from tests.agents.training.small_policies import PROMPT_ONLY, SEEING
 
 SHORT = TrainConfig(steps=6, batch=3, warm_up=2)
 

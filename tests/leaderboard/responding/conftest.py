@@ -1,14 +1,10 @@
-"""Helpers of the folder above are found from here too; networks run in one thread."""
+"""Networks run in one thread here, as when they are scored."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 
 @pytest.fixture(autouse=True)

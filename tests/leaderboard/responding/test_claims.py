@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_drives import made_drive
 
 from leaderboard.responding.by_situation import by_situation, moments_of, ratios_in
 from leaderboard.responding.claims import CLAIMS, FAILS, HOLDS, OPEN, RISES, STANDS_OUT, examined
-from leaderboard.responding.response_tables import claim_rows, situation_rows, tables_of
+from leaderboard.tables.response_tables import claim_rows, situation_rows, tables_of
+from tests.leaderboard.responding.made_drives import made_drive
 
 IN_JUNCTION = [True, True, False, False]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_drives import made_drive
 
 from leaderboard.responding.claims import FAILS, HOLDS, OPEN
 from leaderboard.responding.heads import consistency, head_consistency, likeness, verdict_of_heads
+from tests.leaderboard.responding.made_drives import made_drive
 
 FIRST, SECOND = [1.0, 0.0], [0.0, 1.0]
 

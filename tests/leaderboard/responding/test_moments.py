@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from made_drives import made_drive
 
 from leaderboard.responding.moments import marked_moments, moment_name, stretches
+from tests.leaderboard.responding.made_drives import made_drive
 
 
 def span(count, first, last):

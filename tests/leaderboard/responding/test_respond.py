@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
-from short_drives import short_run
 
 from agents.driveinsight.config import CameraEncoderConfig, GridConfig, PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.responses import responses_at
 from di_envs.world.state import EventKind
-from leaderboard.cli import EXIT_USAGE, main
-from leaderboard.record import EventRecord
+from leaderboard.commands.cli import EXIT_USAGE, main
+from leaderboard.records.record import EventRecord
+from leaderboard.records.results import write_run
+from leaderboard.replaying.retracing import retrace, retrace_env, run_agent
 from leaderboard.responding import measuring
 from leaderboard.responding.drive_responses import drive_responses
 from leaderboard.responding.response_files import (
@@ -26,8 +27,7 @@ from leaderboard.responding.response_files import (
     responses_file,
     write_responses,
 )
-from leaderboard.results import write_run
-from leaderboard.retracing import retrace, retrace_env, run_agent
+from tests.leaderboard.short_drives import short_run
 
 DECISIONS = 12
 CONFIG = PolicyConfig(

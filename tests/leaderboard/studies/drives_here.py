@@ -9,12 +9,12 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
-from leaderboard.jobs import Job, RunSpec
-from leaderboard.messages import Driven, EngineEvent, Ready, Started
-from leaderboard.setting_up import scene_of, set_up
+from leaderboard.running.jobs import Job, RunSpec
+from leaderboard.running.messages import Driven, EngineEvent, Ready, Started
+from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.studies.record import Drive, DrivenRow, Study
 from leaderboard.studies.rows import ABLATION_ROWS, BASELINE_ROW, NULL_ROW
-from leaderboard.wall_clock import Stopwatch
 
 FOLLOWER = f"{Path(__file__).parents[1] / 'route_followers.py'}:RouteFollower"
 

@@ -8,14 +8,14 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
+from leaderboard.pages.study_files import keep_study, write_ablation
 from leaderboard.studies.ablation import findings, sentences, work_out
-from leaderboard.studies.ablation_table import ablation_markdown, ablation_tables
 from leaderboard.studies.effects import EQUIVALENT, MATTERS
-from leaderboard.studies.results import keep_study, write_ablation
 from leaderboard.studies.rows import ABLATION_ROWS, choose_rows
 from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, read_study
 from leaderboard.studies.table_two import TABLE_2
+from leaderboard.tables.ablation_table import ablation_markdown, ablation_tables
 from tests.leaderboard.studies.drives_here import drive, row, study
 
 ROUTES = [str(number) for number in range(12)]

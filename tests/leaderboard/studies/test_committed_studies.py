@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from leaderboard.footing import footing_differences, footing_here, footing_of
-from leaderboard.replay import replay_env
-from leaderboard.results import read_run
+from leaderboard.records.footing import footing_differences, footing_here, footing_of
+from leaderboard.records.results import read_run
+from leaderboard.replaying.replay import replay_env
+from leaderboard.replaying.verify import verify_route
 from leaderboard.studies.ablation import work_out
-from leaderboard.studies.ablation_table import ablation_markdown
 from leaderboard.studies.approaches import GREEN_SHOWN, approaches
 from leaderboard.studies.prompt_editing import finding_sentence, judgements_of
 from leaderboard.studies.record import Drive
 from leaderboard.studies.rows import BASELINE, NULL
 from leaderboard.studies.study_file import read_study
-from leaderboard.verify import verify_route
+from leaderboard.tables.ablation_table import ablation_markdown
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 ARCHIVES = sorted((DOCS / "studies").glob("*.tar.xz"))

@@ -12,15 +12,15 @@ import pytest
 from rich.console import Console
 
 from di_envs.suites import load_suite
-from leaderboard.cli import main
-from leaderboard.jobs import RunSpec
-from leaderboard.results import read_run
+from leaderboard.commands.cli import main
+from leaderboard.records.results import read_run
+from leaderboard.replaying.verify import verify_run
+from leaderboard.running.jobs import RunSpec
 from leaderboard.studies.driving import StudyPlan, drive_study
 from leaderboard.studies.more_seeds import recover_run
 from leaderboard.studies.rows import choose_rows
 from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import read_study, write_study
-from leaderboard.verify import verify_run
 from tests.leaderboard.studies.drives_here import FOLLOWER, HereEngine
 
 ROWS = ("zero-routing", "drop-routing", "zero-speed", "drop-bev", "zero-odometry")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists
 
-from leaderboard.confidence import t_quantile
+from leaderboard.statistics.confidence import t_quantile
 from leaderboard.studies.effects import (
     EQUIVALENT,
     MATTERS,

@@ -17,9 +17,10 @@ from agents.driveinsight.config import config_named
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from di_envs.town.plan import RoutePlan
-from leaderboard.cli import main
-from leaderboard.replay import replay_env
-from leaderboard.results import write_run
+from leaderboard.commands.cli import main
+from leaderboard.pages.prompt_pictures import write_prompt_picture
+from leaderboard.records.results import write_run
+from leaderboard.replaying.replay import replay_env
 from leaderboard.studies.approaches import (
     GREEN_SHOWN,
     RED_SHOWN,
@@ -33,7 +34,6 @@ from leaderboard.studies.experiments import EXPERIMENTS, Verdict, choose_experim
 from leaderboard.studies.failures import has_failed, judge_bev, judge_map
 from leaderboard.studies.lateral import judge_route, lateral_offsets
 from leaderboard.studies.prompt_editing import finding_sentence
-from leaderboard.studies.prompt_pictures import write_prompt_picture
 from leaderboard.studies.record import DrivenRow
 from leaderboard.studies.route_place import RoutePlace, offsets
 from leaderboard.studies.speed_sweep import DOSES_MPS, judge_speed, path_length, sweep

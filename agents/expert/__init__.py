@@ -1,0 +1,1 @@
+"""The agent `expert`: rules over the true state of the world, as kernels."""

@@ -1,0 +1,170 @@
+# mypy: disallow_untyped_defs=False
+"""One decision of the expert, as a kernel: where am I, may I change lanes, how fast, which way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.expert.actors import look
+from agents.expert.control import steering
+from agents.expert.junction import crossing_acceleration, exit_acceleration, junction_ahead
+from agents.expert.line import Progress, localise
+from agents.expert.path import CHANGE_END_M, CHANGE_ROOM_M
+from agents.expert.rules import line_acceleration, next_line, stands_at
+from agents.expert.sight import (
+    BEST,
+    FRONT_OK,
+    LEADER_REAR,
+    LEADER_SPEED,
+    REAR_OK,
+    blank_sight,
+)
+from agents.expert.speed import cruise, forecast, stop_within
+from di_envs.numerics.kernels import kernel
+from di_envs.world.dynamics import pedals
+
+FORECAST_M = 100
+LONGEST_CHANGE_M = 45.0
+SHORTEST_CHANGE_M = 8.0
+BEFORE_CHANGE_S = 3.0  # gaps are looked for from this time before a change may begin
+MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls back
+
+
+@kernel
+def start_progress():
+    """The memory at a path's start."""
+    return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0)
+
+
+@kernel
+def update_progress(path, progress, x, y, speed, half_length, numbers):
+    """The memory, brought up to where the car is now."""
+    station, _, _ = localise(path, progress, x, y)
+    line = next_line(path, progress.line, station - half_length)
+    stood_s = progress.stood_s if line == progress.line else 0.0
+    if stands_at(path, line, station + half_length, speed):
+        stood_s += numbers.dt_s
+    return Progress(
+        station,
+        progress.changes,
+        progress.change_begin_m,
+        progress.change_length_m,
+        line,
+        stood_s,
+        progress.waiting_s,
+    )
+
+
+@kernel
+def change_due(path, progress, speed):
+    """Offset of the present lane from the one to change to, if that is due soon, else 0."""
+    k = progress.changes
+    if k >= path.change_jump_m.size:
+        return 0.0
+    under_way = progress.changes > 0 and (
+        progress.station_m < progress.change_begin_m + 0.9 * progress.change_length_m
+    )
+    if under_way or progress.station_m + BEFORE_CHANGE_S * speed < path.change_jump_m[k]:
+        return 0.0
+    return path.change_shift_m[k]
+
+
+@kernel
+def begin_change(path, progress, speed, free, numbers):
+    """Commits to the next lane change if its gap is free and its time has come."""
+    k = progress.changes
+    if not free or progress.station_m < path.change_jump_m[k]:
+        waiting = progress.waiting_s
+        if not free:
+            waiting += numbers.dt_s
+        return Progress(
+            progress.station_m,
+            k,
+            progress.change_begin_m,
+            progress.change_length_m,
+            progress.line,
+            progress.stood_s,
+            waiting,
+        )
+    room = path.change_limit_m[k] - CHANGE_END_M - progress.station_m
+    if k + 1 < path.change_jump_m.size and path.change_jump_m[k + 1] < path.change_limit_m[k]:
+        room -= CHANGE_ROOM_M
+    wanted = min(max(numbers.change_time_s * speed, CHANGE_ROOM_M), LONGEST_CHANGE_M)
+    length = max(min(wanted, room), SHORTEST_CHANGE_M)
+    return Progress(
+        progress.station_m, k + 1, progress.station_m, length, progress.line, progress.stood_s, 0.0
+    )
+
+
+@kernel
+def wait_for_gap(path, progress, speed, beside, numbers):
+    """Acceleration while a lane change is due and its gap is not free."""
+    latest = path.change_latest_m[progress.changes] - progress.station_m
+    best = stop_within(latest, speed, numbers)
+    if beside and speed > 3.0:
+        best = min(best, MAKE_ROOM_MPS2)
+    return best
+
+
+@kernel
+def decide(path, progress, actors, ways, lights, ego, numbers, model):
+    """The control of one decision.
+
+    Args:
+        path: The route's path.
+        progress: The memory.
+        actors, ways, lights: What is seen of the world (`expert_scene`), only read.
+        ego: Index of the ego.
+        numbers: From `ExpertConfig`.
+        model: From `EgoModel`.
+
+    Returns:
+        (throttle, steer, brake, memory).
+    """
+    x, y, yaw = actors.x[ego], actors.y[ego], actors.yaw[ego]
+    speed, half = actors.speed[ego], actors.half_length[ego]
+    progress = update_progress(path, progress, x, y, speed, half, numbers)
+    times = np.empty(FORECAST_M)
+    forecast(path, progress.station_m, speed, numbers, times)
+    junction, first, last, begin_m, end_m = junction_ahead(path, progress, half)
+    sight = blank_sight()
+    shift = change_due(path, progress, speed)
+    if not numbers.ignore_actors:
+        look(
+            sight,
+            path,
+            progress,
+            actors,
+            ways,
+            ego,
+            shift,
+            (begin_m, end_m),
+            junction,
+            times,
+            numbers,
+        )
+    best = min(cruise(path, progress.station_m, speed, numbers), sight.number[BEST])
+    if shift != 0.0:
+        beside = sight.number[REAR_OK] == 0.0
+        free = sight.number[FRONT_OK] == 1.0 and not beside
+        progress = begin_change(path, progress, speed, free, numbers)
+        if not free:
+            best = min(best, wait_for_gap(path, progress, speed, beside, numbers))
+    queue = (sight.number[LEADER_REAR], sight.number[LEADER_SPEED])
+    best = min(
+        best,
+        line_acceleration(path, progress, lights, speed, half, times, queue, numbers),
+    )
+    if junction >= 0 and not numbers.ignore_actors:
+        front = progress.station_m + half
+        best = min(
+            best,
+            crossing_acceleration(
+                sight, path, progress, actors, ways, ego, first, last, begin_m, times, numbers
+            ),
+            exit_acceleration(sight, begin_m, front, half, speed, numbers),
+        )
+    best = min(max(best, -numbers.emergency_mps2), numbers.acceleration_mps2)
+    throttle, brake = pedals(best, speed, model)
+    steer = steering(path, progress, x, y, yaw, speed, model)
+    return throttle, steer, brake, progress

@@ -1,0 +1,87 @@
+# mypy: disallow_untyped_defs=False
+"""People, seen from the expert's path: those who cross it, and those who may step out, as kernels.
+
+A cyclist who crosses the road off all lanes is taken for somebody on foot, only faster.
+"""
+
+from __future__ import annotations
+
+import math
+
+from agents.expert.sight import BEST
+from agents.expert.speed import stop_within, time_to
+from di_envs.numerics.kernels import kernel
+from di_envs.world.state import ActorKind
+
+AHEAD_OF_WALKER_S = 1.2  # by which the car is gone before somebody steps onto its path
+SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
+LOOK_S = 6.0
+STANDS_MPS = 0.1  # who is slower than this stands
+FACING = 0.7  # sine of the angle to the path above which somebody faces it
+KERB_M = 12.0  # from the path, within which somebody who faces it may step out
+WARY_MPS = 3.0  # past somebody who has not stepped out yet
+WARY_MPS2 = 5.0  # with which the car can still stop for him
+
+_WALKER, _BICYCLE = int(ActorKind.WALKER), int(ActorKind.BICYCLE)
+
+
+@kernel
+def is_on_foot(actors, actor):
+    """Whether somebody walks, or rides where there is no lane."""
+    kind = actors.kind[actor]
+    return kind == _WALKER or (kind == _BICYCLE and actors.lane[actor] < 0)
+
+
+@kernel
+def note_person(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
+    """Stops before somebody on the path, or who will be when the car is there; else is wary."""
+    _note_crossing(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
+    if actors.speed[actor] < STANDS_MPS and actors.walk_edge[actor] < 0:
+        _note_waiting(sight, actors, actor, ego, station, offset, turn, progress, numbers)
+
+
+@kernel
+def _note_crossing(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
+    across = actors.speed[actor] * math.sin(turn)
+    along = actors.speed[actor] * math.cos(turn)
+    half, body = actors.half_length[ego], actors.half_length[actor]
+    reach = actors.half_width[ego] + body + numbers.walker_margin_m
+    enters, leaves = 0.0, LOOK_S
+    if abs(across) > 0.2:
+        towards = -math.copysign(offset, offset * across)  # positive while coming nearer
+        enters = max((towards - reach) / abs(across), 0.0)
+        leaves = (towards + reach) / abs(across)
+    if (abs(offset) >= reach and abs(across) <= 0.2) or leaves <= 0.0 or enters > LOOK_S:
+        return
+    meeting = station + along * min(enters, 2.0)
+    distance = meeting - body - progress.station_m - half
+    if distance < 0.0 and abs(offset) > actors.half_width[ego] + body:
+        return  # beside the car: it only gets out of that walker's way by going on
+    if station + body < progress.station_m:
+        return
+    arrives = time_to(times, distance - 0.5)
+    gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
+    if arrives > leaves + SPARE_S or gone + AHEAD_OF_WALKER_S < enters:
+        return
+    stop = stop_within(distance - numbers.walker_gap_m, actors.speed[ego], numbers)
+    sight.number[BEST] = min(sight.number[BEST], stop)
+
+
+@kernel
+def _note_waiting(sight, actors, actor, ego, station, offset, turn, progress, numbers):
+    """Slows down for somebody who stands beside the road and faces it: he may step out.
+
+    Those on walkways and crosswalks look out themselves before they step onto the road.
+    """
+    towards = -math.copysign(math.sin(turn), offset * math.sin(turn))  # 1 straight at the path
+    if towards < FACING or abs(offset) > KERB_M:
+        return
+    speed = actors.speed[ego]
+    distance = station - actors.half_length[actor] - progress.station_m - actors.half_length[ego]
+    if distance < 0.0:
+        return
+    step = WARY_MPS2 * numbers.dt_s
+    room = max(distance - numbers.walker_gap_m, 0.0)
+    allowed = max(math.sqrt(step * step + 2.0 * WARY_MPS2 * room) - step, WARY_MPS)
+    wanted = max((allowed - speed) / numbers.dt_s, -WARY_MPS2)
+    sight.number[BEST] = min(sight.number[BEST], wanted)

@@ -1,0 +1,37 @@
+# mypy: disallow_untyped_defs=False
+"""What the expert's looking round comes to: a few numbers, and who may cross a junction."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.expert.speed import NO_LIMIT_MPS2
+from di_envs.numerics.kernels import kernel
+
+FAR_M = 1e6
+
+
+class Sight(NamedTuple):
+    """What `look` finds: numbers by their place in `number`, and those who cross."""
+
+    number: NDArray[np.float64]  # (7,) see the constants below
+    holder: NDArray[np.int32]  # (32,) vehicles with a grant for a junction near
+    holders: NDArray[np.int32]  # (1,) how many
+
+
+BEST, LEADER_REAR, LEADER_SPEED, FRONT_OK, REAR_OK, INSIDE_M, ROOM_M = range(7)
+
+
+@kernel
+def blank_sight():
+    """Room for what `look` finds; nothing seen yet."""
+    number = np.zeros(7)
+    number[BEST] = NO_LIMIT_MPS2
+    number[LEADER_REAR] = FAR_M
+    number[FRONT_OK] = 1.0
+    number[REAR_OK] = 1.0
+    number[ROOM_M] = FAR_M
+    return Sight(number, np.zeros(32, np.int32), np.zeros(1, np.int32))

@@ -1,0 +1,190 @@
+"""A policy being trained on collected drives: plain torch, one function a step, exact to resume.
+
+Which samples make a step, how they are varied and what is hidden in them are functions of (seed,
+step), so a run that was killed goes on from its checkpoint as if nothing had been.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from agents.driveinsight.config import TOKENS, PolicyConfig
+from agents.driveinsight.losses import counts, losses
+from agents.driveinsight.model import Policy
+from agents.training.config import TrainConfig, TrainingError
+from agents.training.distributed import ALONE, Team
+from agents.training.predictions import look
+from agents.training.samples import Batch, hidden_components
+from di_envs.numerics.keyed_random import Stream, keyed_hash
+
+_PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
+
+
+@dataclass(kw_only=True)
+class Training:
+    """A policy being trained: all that a checkpoint holds, and who trains it."""
+
+    policy: Policy
+    optimiser: torch.optim.Optimizer
+    config: TrainConfig
+    step: int = 0
+    team: Team = ALONE
+
+    @classmethod
+    def begin(
+        cls, policy_config: PolicyConfig, config: TrainConfig, device: str, team: Team = ALONE
+    ) -> Training:
+        """Fresh weights, drawn from the seed."""
+        torch.manual_seed(config.seed)
+        policy = Policy(policy_config).to(device)
+        team.begin(policy)
+        optimiser = torch.optim.AdamW(
+            _groups(policy, config), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        return cls(policy=policy, optimiser=optimiser, config=config, team=team)
+
+    def save(self, path: Path) -> None:
+        """Writes a checkpoint; the old one stays until the new one is whole.
+
+        Of a team the first process does.
+        """
+        if not self.team.first:
+            return
+        part = path.with_suffix(".part")
+        torch.save(
+            {
+                "policy_config": self.policy.config.to_mapping(),
+                "config": self.config.to_mapping(),
+                "policy": self.policy.state_dict(),
+                "optimiser": self.optimiser.state_dict(),
+                "step": self.step,
+            },
+            part,
+        )
+        os.replace(part, path)
+
+    def load(self, path: Path) -> None:
+        """Goes on from a checkpoint.
+
+        Raises:
+            TrainingError: If it is not whole, or of another policy or training.
+        """
+        device = next(self.policy.parameters()).device
+        try:
+            content = torch.load(path, weights_only=True, map_location=device)
+            policy, config = content["policy_config"], content["config"]
+        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError,
+                pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
+            raise TrainingError(
+                f"{path} is not whole ({error!r}): delete it to begin again"
+            ) from error
+        different = [
+            *_differences(policy, self.policy.config.to_mapping()),
+            # what a field did that is newer than the checkpoint is what its default does
+            *_differences({**TrainConfig().to_mapping(), **config}, self.config.to_mapping()),
+        ]
+        if different:
+            raise TrainingError(
+                f"{path} is of another training ({', '.join(different)}): give the same options "
+                f"to go on with it, or another --output to begin a new one"
+            )
+        self.policy.load_state_dict(content["policy"])
+        self.optimiser.load_state_dict(content["optimiser"])
+        self.step = content["step"]
+
+    def update(self, batch: Batch) -> dict[str, float]:
+        """One step on a batch, or on a share of it; returns the terms of the whole batch's loss.
+
+        Raises:
+            TrainingError: If the loss is not finite: the weights are left as they were.
+        """
+        for group in self.optimiser.param_groups:
+            group["lr"] = self._learning_rate() * group["rate"]
+        self.policy.train()
+        self.optimiser.zero_grad()
+        hidden = self._hidden(self.config.batch)[self.team.share(self.config.batch)]
+        terms = self._terms(batch, hidden)
+        values = self.team.summed(terms)
+        if not math.isfinite(values["total"]):
+            raise self._diverged(f"loss is {values['total']}")
+        terms["total"].backward()
+        self.team.sum_gradients(self.policy.parameters())
+        norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.config.clip)
+        if not torch.isfinite(norm):
+            raise self._diverged(f"gradient's norm is {float(norm)}")
+        self.optimiser.step()
+        self.step += 1
+        return values
+
+    def measure(self, data: Iterator[Batch]) -> float:
+        """The mean waypoint loss on moments of drives kept out of training, nothing hidden [m].
+
+        Args:
+            data: Where these moments come next; see `loading.order`.
+        """
+        self.team.share_buffers(self.policy)
+        self.policy.eval()
+        looks = self.config.measured // self.config.batch
+        share = self.team.share(self.config.batch)
+        everything = torch.ones(share.stop - share.start, len(TOKENS))
+        with torch.no_grad():
+            found = [
+                self.team.summed(self._terms(next(data), everything))["waypoints"]
+                for _ in range(looks)
+            ]
+        return sum(found) / looks
+
+    def _terms(self, batch: Batch, hidden: Tensor) -> dict[str, Tensor]:
+        """The terms of the loss; of a share, such that they sum up to the whole batch's."""
+        mixed = self.config.precision == "bfloat16"
+        output, targets = look(self.policy, batch, hidden, mixed=mixed)
+        terms = losses(output, targets, self.config.loss)
+        return self.team.weighted(terms, counts(targets, self.config.loss))
+
+    def _diverged(self, what: str) -> TrainingError:
+        return TrainingError(
+            f"the {what} at step {self.step}: try a lower --learning-rate in another --output; the "
+            f"last checkpoint is whole"
+        )
+
+    def _learning_rate(self) -> float:
+        config = self.config
+        if self.step < config.warm_up:
+            return config.learning_rate * (self.step + 1) / config.warm_up
+        done = (self.step - config.warm_up) / max(config.steps - config.warm_up, 1)
+        return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * min(done, 1.0)))
+
+    def _hidden(self, size: int) -> Tensor:
+        """(B, 10) which components are hidden (0) in this step."""
+        if self.config.overfit:
+            return torch.ones(size, len(TOKENS))
+        key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
+        return hidden_components(self.policy.config, size, key)
+
+
+def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:
+    """Parameters by how fast they learn: those that see, and those that plan."""
+    seeing, planning = list[nn.Parameter](), list[nn.Parameter]()
+    for name, parameter in policy.named_parameters():
+        (planning if name.startswith(_PLANNING) else seeing).append(parameter)
+    groups = ((seeing, 1.0), (planning, config.planner_rate))
+    return [{"params": params, "rate": rate} for params, rate in groups if params]
+
+
+def _differences(saved: Mapping[str, Any], ours: Mapping[str, Any]) -> list[str]:
+    """What was otherwise when a checkpoint was written, in words."""
+    return [
+        f"{name} was {saved.get(name, 'not there')}, is {value}"
+        for name, value in ours.items()
+        if saved.get(name, None) != value
+    ]

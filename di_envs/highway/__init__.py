@@ -1,0 +1,1 @@
+"""Towns and scenes as highway-env objects: for its controllers, its viewer and comparisons."""

@@ -1,0 +1,99 @@
+"""How kernels are compiled and where their machine code is kept.
+
+Numba's own cache goes stale when a helper in another module changes, so a kernel is cached in a
+directory of the user's cache folder that is named by its source and those it builds on, Numba's
+version and the CPU. A change of any of these gives a new directory, never stale code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import re
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+# Bits must not depend on whether Intel's vector maths library is installed; read when numba loads.
+os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
+
+import llvmlite.binding
+import numba
+from platformdirs import user_cache_path
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_IMPORT = re.compile(rb"^from ((?:di_envs|agents)[.\w]*) import", re.MULTILINE)
+
+
+@cache
+def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
+    """A module's source, and the modules of ours that it imports names from."""
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    spec = None if loaded else importlib.util.find_spec(module)
+    path = loaded or (spec.origin if spec else None)
+    text = Path(path).read_bytes() if path else b""
+    imported = {match.decode() for match in _IMPORT.findall(text)}
+    return text, tuple(sorted(imported))
+
+
+@cache
+def sources_digest(module: str) -> str:
+    """Names a module's source and all sources of ours that it builds on, directly or not."""
+    seen: dict[str, bytes] = {}
+    todo = [module]
+    while todo:
+        name = todo.pop()
+        if name not in seen:
+            seen[name], imported = _source(name)
+            todo += imported
+    digest = hashlib.sha256()
+    for name in sorted(seen):
+        digest.update(name.encode() + b"\0" + seen[name] + b"\0")
+    digest.update(f"{numba.__version__} {sys.version_info[:3]} {cpu_capability()}".encode())
+    return digest.hexdigest()[:16]
+
+
+def cpu_capability() -> str:
+    """The CPU that code is compiled for: its name and a hash of the features it offers."""
+    features = llvmlite.binding.get_host_cpu_features().flatten()
+    digest = hashlib.sha256(features.encode()).hexdigest()[:8]
+    return f"{llvmlite.binding.get_host_cpu_name()}-{digest}"
+
+
+def kernel_sources() -> list[Path]:
+    """Every file of ours that defines kernels, in a fixed order."""
+    top = Path(__file__).resolve().parents[2]
+    files = (path for root in ("di_envs", "agents") for path in sorted((top / root).rglob("*.py")))
+    return [path for path in files if "\n@kernel\n" in path.read_text(encoding="utf-8")]
+
+
+def kernel_cache() -> Path:
+    """The folder of compiled kernels, below the user's cache folder."""
+    return user_cache_path("driveinsight") / "kernels"
+
+
+def kernel(function: Function) -> Function:
+    """Compiles `function` without the Python interpreter, releasing the GIL, never `fastmath`."""
+    # read by Numba as it sets up the function's cache, just below
+    numba.config.CACHE_DIR = str(kernel_cache() / sources_digest(function.__module__))
+    compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return compiled
+
+
+def bind(function: Function, *arguments: Any) -> Function:
+    """The machine code of a kernel for arguments of these types.
+
+    A call then skips the look-up of types, which takes longer than a small kernel's work. The
+    caller answers for passing the same types each time: nothing checks them any more.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled: Any = function
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    compiled.compile(signature)
+    bound: Function = compiled.overloads[signature].entry_point
+    return bound

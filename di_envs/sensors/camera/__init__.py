@@ -1,0 +1,1 @@
+"""Pinhole cameras: colours, depth, tags and instances of the scene, a row of pixels at a time."""

@@ -1,0 +1,177 @@
+# mypy: disallow_untyped_defs=False
+"""Reading rasters of the ground, a span of pixels at a time.
+
+A bilinear sample is made in three passes, as the first and the last are pure arithmetic, which LLVM
+vectorises, and only the one between reads from places all over memory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from di_envs.numerics.kernels import kernel
+
+F = np.float32
+ZERO, HALF = F(0.0), F(0.5)
+_U4, _U8, _U16 = np.uint32(4), np.uint32(8), np.uint32(16)
+_BYTE, _TWO_BYTES, _RED_BLUE = np.uint32(0xFF), np.uint32(0xFFFF), np.uint32(0xFF00FF)
+_WHOLE = np.uint32(256)
+
+
+@kernel
+def plane_points(places, depth, stride, start, gain, turn, first):
+    """Where the rays of every `stride`-th pixel end, in texels along one axis.
+
+    Args:
+        places: (N,) written.
+        depth: Of the row's pixels, from the span's first on.
+        stride: Pixels from one place to the next.
+        start: Of the camera.
+        gain: What a metre of depth adds at column 0.
+        turn: What each column adds to that.
+        first: Column of the span's first pixel.
+    """
+    end = depth.shape[0] - 1
+    for x in range(places.shape[0]):
+        i = x * stride
+        z = depth[i if i < end else end]
+        places[x] = start + z * (gain + (first + F(i)) * turn)
+
+
+@kernel
+def texel_places(u, v, index, share, width, height, scale):
+    """Which four texels of a level surround each place, and how near it is to each.
+
+    Args:
+        u, v: (N,) places in texels of the finest level.
+        index: (N,) written: the first texel, counted within the level; the others are the next one
+            and the two below.
+        share: (N,) written: 16ths of the way to the next texel, times 16, plus 16ths downwards.
+        width, height: Of the level.
+        scale: Its texels for one of the finest level.
+    """
+    top_u, top_v = F(width) - F(1.01), F(height) - F(1.01)
+    row = np.int32(width)
+    for x in range(index.shape[0]):
+        a = u[x] * scale - HALF
+        b = v[x] * scale - HALF
+        a = a if a > ZERO else ZERO
+        b = b if b > ZERO else ZERO
+        a = a if a < top_u else top_u
+        b = b if b < top_v else top_v
+        i, j = np.int32(a), np.int32(b)
+        p = np.int32((a - F(i)) * F(16.0))
+        q = np.int32((b - F(j)) * F(16.0))
+        index[x] = np.int32(np.int32(j * row) + i)
+        share[x] = np.int32(np.int32(p << 4) | q)
+
+
+@kernel
+def fetch(index, found, texels, start, width):
+    """Reads four texels for each place, side by side into `found`, (4 N,)."""
+    first, below = np.uint64(start), np.uint64(width)
+    for x in range(index.shape[0]):
+        at = first + np.uint64(index[x])  # unsigned: what cannot be negative is not tested for it
+        found[4 * x] = texels[at]
+        found[4 * x + 1] = texels[at + np.uint64(1)]
+        found[4 * x + 2] = texels[at + below]
+        found[4 * x + 3] = texels[at + below + np.uint64(1)]
+
+
+@kernel
+def add_colours(found, share, red, green, blue, weight):
+    """Adds bilinear samples, made of what `fetch` found, to a span of colours."""
+    part = weight / F(256.0)
+    for x in range(red.shape[0]):
+        p, q = np.uint32(share[x] >> 4), np.uint32(share[x] & 15)
+        a, b, c, d = found[4 * x], found[4 * x + 1], found[4 * x + 2], found[4 * x + 3]
+        wd = np.uint32(p * q)  # in 256ths
+        wb = np.uint32(np.uint32(p << _U4) - wd)
+        wc = np.uint32(np.uint32(q << _U4) - wd)
+        wa = np.uint32(_WHOLE - wb - wc - wd)
+        # red and blue side by side in one word, 16 bits each
+        rb = np.uint32(
+            np.uint32(a & _RED_BLUE) * wa
+            + np.uint32(b & _RED_BLUE) * wb
+            + np.uint32(c & _RED_BLUE) * wc
+            + np.uint32(d & _RED_BLUE) * wd
+        )
+        g = np.uint32(
+            np.uint32((a >> _U8) & _BYTE) * wa
+            + np.uint32((b >> _U8) & _BYTE) * wb
+            + np.uint32((c >> _U8) & _BYTE) * wc
+            + np.uint32((d >> _U8) & _BYTE) * wd
+        )
+        red[x] += F(np.int32(rb & _TWO_BYTES)) * part
+        green[x] += F(np.int32(g)) * part
+        blue[x] += F(np.int32(rb >> _U16)) * part
+
+
+@kernel
+def water_depths(found, share, water, level):
+    """How deep water stands at each place, 0 to 2, if roads are under water up to a level 1 to 8.
+
+    The nearest of the four texels says how low the place lies.
+    """
+    for x in range(water.shape[0]):
+        p, q = share[x] >> 4, share[x] & 15
+        upper = found[4 * x] if p < 8 else found[4 * x + 1]
+        lower = found[4 * x + 2] if p < 8 else found[4 * x + 3]
+        last = np.int32((upper if q < 8 else lower) >> np.uint32(24))
+        tag = last & 31
+        deep = level - F(np.int32(last >> 5))
+        deep = deep if deep > ZERO else ZERO
+        deep = deep if deep < F(2.0) else F(2.0)
+        water[x] = deep if (tag == 1) | (tag == 24) else ZERO
+
+
+@kernel
+def last_bytes(u, v, last, texels, width, height):
+    """Reads the last byte of the nearest texel of the finest level."""
+    for x in range(u.shape[0]):
+        i, j = int(u[x]), int(v[x])
+        i = i if i > 0 else 0
+        j = j if j > 0 else 0
+        i = i if i < width else width - 1
+        j = j if j < height else height - 1
+        last[x] = np.uint8(texels[j * width + i] >> 24)
+
+
+@kernel
+def tags_of(last, tag):
+    """The tags in texels' last bytes."""
+    for x in range(last.shape[0]):
+        tag[x] = last[x] & np.uint8(31)
+
+
+@kernel
+def spread(samples, colour, stride):
+    """Fills in a span from samples of every second, fourth or eighth pixel."""
+    whole = colour.shape[0] // stride
+    if stride == 8:  # loops of a known length become straight vector code
+        for k in range(whole):
+            value, step = samples[k], (samples[k + 1] - samples[k]) * F(0.125)
+            for i in range(8):
+                colour[8 * k + i] = value + F(i) * step
+    elif stride == 4:
+        for k in range(whole):
+            value, step = samples[k], (samples[k + 1] - samples[k]) * F(0.25)
+            for i in range(4):
+                colour[4 * k + i] = value + F(i) * step
+    else:
+        for k in range(whole):
+            colour[2 * k] = samples[k]
+            colour[2 * k + 1] = HALF * (samples[k] + samples[k + 1])
+    for x in range(whole * stride, colour.shape[0]):
+        share = F(x - whole * stride) / F(stride)
+        colour[x] = samples[whole] + (samples[whole + 1] - samples[whole]) * share
+
+
+@kernel
+def puddles(water, red, green, blue, share, r, g, b):
+    """Covers the low places of a span with water that shows the sky."""
+    for x in range(water.shape[0]):
+        k = share * HALF * water[x]
+        red[x] += (r - red[x]) * k
+        green[x] += (g - green[x]) * k
+        blue[x] += (b - blue[x]) * k

@@ -1,0 +1,1 @@
+"""LiDAR: rays against the same scene that the cameras show."""

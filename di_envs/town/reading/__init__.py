@@ -1,0 +1,1 @@
+"""From an OpenDRIVE file to lanes, links, crosswalks and signals."""

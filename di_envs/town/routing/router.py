@@ -1,0 +1,360 @@
+"""Plans dense routes between keypoints, equal to what the CARLA Leaderboard makes of them.
+
+Keypoints are joined two by two with CARLA's global planner at 1 m, and the pieces laid end to end:
+the points follow lane centres, jump sideways at a lane change, and may step back a little where
+two pieces meet. Target points are thinned out by the 50 m rule of Leaderboard 1.0.
+
+Source: behaviour of `agents/navigation/global_route_planner.py` (CARLA Python API, MIT licence) and
+of `leaderboard/utils/route_manipulation.py` (CARLA Leaderboard 1.0, MIT licence); our own code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from di_envs.town.plan import RoadOption, RoutePlan
+from di_envs.town.routing.crossings import name_connectors
+from di_envs.town.routing.road_graph import STEP_M, Edge, RoadGraph, build_road_graph
+from di_envs.town.routing.snapping import Snap
+from di_envs.town.routing.traces import Trace, join_traces
+from di_envs.town.town import Town
+
+MAX_SNAP_M = 60.0  # the official Town05 Short keypoints lie up to 58 m from a lane
+TARGET_SPACING_M = 50.0  # Leaderboard 1.0
+STRAIGHT_BELOW_RAD = math.radians(35.0)  # a smaller change of direction is no turn
+SKIP_AT_CHANGE = 5  # points by which a lane change moves ahead
+
+Array = TypeVar("Array", bound=NDArray[Any])
+
+_LANE_CHANGES = (RoadOption.CHANGELANELEFT, RoadOption.CHANGELANERIGHT)
+
+
+class RouteError(ValueError):
+    """A route that cannot be planned; the message names the keypoint and what to do."""
+
+
+def plan_route(
+    town: Town,
+    keypoints: ArrayLike,
+    *,
+    route_id: str = "0",
+    graph: RoadGraph | None = None,
+    max_snap_m: float = MAX_SNAP_M,
+) -> RoutePlan:
+    """Plans a dense route through keypoints, in order.
+
+    Args:
+        town: The town to drive in.
+        keypoints: (K, 3) x, y, z [m], world frame, K at least 2. Headings are not asked for, as the
+            Leaderboard ignores them: the nearest driving lane decides.
+        route_id: Name of the route in plans, results and errors.
+        graph: The town's `build_road_graph(town)`, to plan several routes without building it anew.
+        max_snap_m: Largest distance of a keypoint from its lane. The default admits the official
+            files; files written for one map can ask for a metre.
+
+    Returns:
+        The plan, its arrays read-only.
+
+    Raises:
+        RouteError: If keypoints are missing, not finite or too far from any driving lane, or if no
+            way leads from one to the next.
+        ValueError: If `graph` was built of another town.
+    """
+    graph = build_road_graph(town) if graph is None else graph
+    if graph.town.content_hash != town.content_hash:
+        raise ValueError(
+            f"The graph was built of town '{graph.town.name}', the route asks for '{town.name}'; "
+            "build it of the same town with build_road_graph(town)."
+        )
+    places = _checked_keypoints(keypoints, route_id)
+    snaps = _checked_snaps(graph, places, route_id, max_snap_m)
+    turns = _TurnMemory()
+    pieces: list[Trace] = []
+    options: list[int] = []
+    for leg in range(len(places) - 1):
+        path = _path_between(graph, snaps, leg, route_id)
+        piece = _trace_path(graph, path, snaps[leg], snaps[leg + 1], places[leg + 1], turns)
+        pieces.append(piece.trace)
+        options.extend(piece.options)
+    trace = name_connectors(town.lanes, join_traces(pieces))
+    return _plan_of(town, route_id, places, trace, np.array(options, np.int8))
+
+
+def target_indices(
+    points: NDArray[np.float64], option: NDArray[np.int8], spacing_m: float = TARGET_SPACING_M
+) -> NDArray[np.int32]:
+    """The sparse target points of a dense route, by the rule of Leaderboard 1.0.
+
+    Kept are every lane-change point, every point where the option changes (unless a lane change
+    came just before), the first point more than `spacing_m` after the last kept one, and the last.
+
+    Args:
+        points: (R, 3 or more) x, y, z of the dense route.
+        option: (R,) RoadOption.
+        spacing_m: 50 in Leaderboard 1.0, 200 in 2.x.
+    """
+    step_m = np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1)
+    # fifty steps of 1 m are not more than 50 m, whatever their rounding errors add up to; CARLA's
+    # single-precision locations let chance decide, so its targets may lie one point to either side
+    limit_m = spacing_m + 1e-6
+    kept = []
+    since_m = 0.0
+    before = None
+    for i, now in enumerate(option.tolist()):
+        changed = now != before and before not in _LANE_CHANGES
+        if now in _LANE_CHANGES or changed or since_m > limit_m or i == len(option) - 1:
+            kept.append(i)
+            since_m = 0.0
+        else:
+            since_m += float(step_m[i - 1])
+        before = now
+    return np.array(kept, np.int32)
+
+
+@dataclass(kw_only=True)
+class _TurnMemory:
+    """What the turn decision remembers from edge to edge, and from one leg to the next."""
+
+    last_option: RoadOption = RoadOption.VOID
+    junction_exit: int = -1  # node at which the junction now being crossed is left
+
+
+@dataclass(kw_only=True)
+class _Piece:
+    """A dense piece of route while it is laid."""
+
+    traces: list[Trace] = field(default_factory=list)
+    options: list[int] = field(default_factory=list)
+
+    @property
+    def trace(self) -> Trace:
+        return join_traces(self.traces)
+
+    def add(self, trace: Trace, option: RoadOption) -> None:
+        self.traces.append(trace)
+        self.options.extend([int(option)] * len(trace.lane))
+
+
+def _checked_keypoints(keypoints: ArrayLike, route_id: str) -> NDArray[np.float64]:
+    places = np.array(keypoints, dtype=np.float64)
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise RouteError(
+            f"Route '{route_id}': expected keypoints of shape (K, 3) with x, y, z, "
+            f"got shape {places.shape}."
+        )
+    if len(places) < 2:
+        raise RouteError(
+            f"Route '{route_id}': expected at least two keypoints, a start and an end, "
+            f"got {len(places)}."
+        )
+    for i in np.flatnonzero(~np.isfinite(places).all(axis=1)):
+        raise RouteError(
+            f"Route '{route_id}': keypoint {i} is {places[i].tolist()}; "
+            "expected finite metres, so correct it in the route file."
+        )
+    return places
+
+
+def _checked_snaps(
+    graph: RoadGraph, places: NDArray[np.float64], route_id: str, max_snap_m: float
+) -> list[Snap]:
+    snaps = [graph.snap(place) for place in places]
+    for i, snap in enumerate(snaps):
+        if snap.distance_m > max_snap_m:
+            raise RouteError(
+                f"Route '{route_id}': keypoint {i} at {_text(places[i])} is "
+                f"{snap.distance_m:.1f} m from the nearest driving lane of town "
+                f"'{graph.town.name}'; at most {max_snap_m:g} m is allowed. The nearest place on a "
+                f"lane is {_text(snap.place.points[0])}: move the keypoint, or check that the "
+                "route was written for this town."
+            )
+        if snap.piece not in graph.piece_edge:
+            raise RouteError(
+                f"Route '{route_id}': keypoint {i} at {_text(places[i])} lies on a lane that leads "
+                "nowhere; move it to another lane."
+            )
+    return snaps
+
+
+def _path_between(graph: RoadGraph, snaps: Sequence[Snap], leg: int, route_id: str) -> list[int]:
+    start, end = snaps[leg], snaps[leg + 1]
+    path = graph.shortest_path(graph.piece_edge[start.piece][0], graph.piece_edge[end.piece][0])
+    if path is None:
+        raise RouteError(
+            f"Route '{route_id}': no way leads from keypoint {leg} ({_lane_text(graph, start)}) to "
+            f"keypoint {leg + 1} ({_lane_text(graph, end)}) in town '{graph.town.name}'; put the "
+            "keypoints on lanes that are connected in the direction of travel."
+        )
+    return [*path, graph.piece_edge[end.piece][1]]
+
+
+def _trace_path(
+    graph: RoadGraph,
+    path: list[int],
+    start: Snap,
+    end: Snap,
+    goal: NDArray[np.float64],
+    turns: _TurnMemory,
+) -> _Piece:
+    """Lays the points of one leg along a path of nodes."""
+    edges = [graph.edges[a][b] for a, b in pairwise(path)]
+    piece = _Piece()
+    here = start.place
+    for i, edge in enumerate(edges):
+        option = _turn_option(graph, edges, i, turns)
+        if edge.option in _LANE_CHANGES:
+            piece.add(here, option)
+            here = _beyond_change(graph, edge, here)
+            piece.add(here, option)
+            continue
+        along = edge.trace.part(slice(_nearest(edge.trace, here), None))
+        if i == len(edges) - 1:
+            along = _cut_at_goal(edge, along, end, goal)
+        else:
+            along = _ending_on(along, edge, edges[i + 1])
+        piece.add(along, option)
+        here = along.part(slice(-1, None))
+    return piece
+
+
+def _ending_on(along: Trace, edge: Edge, following: Edge) -> Trace:
+    """Gives the last point, at which several lanes may begin, to the lane that is followed."""
+    if following.lane in (edge.lane, along.lane[-1]):
+        return along
+    lane, lane_m = along.lane.copy(), along.lane_m.copy()
+    lane[-1], lane_m[-1] = following.lane, 0.0
+    return along._replace(lane=lane, lane_m=lane_m)
+
+
+def _beyond_change(graph: RoadGraph, edge: Edge, here: Trace) -> Trace:
+    """The place on the lane beside at which a lane change arrives."""
+    beside = graph.edge_of_piece(edge.exit_piece).trace
+    between = beside.part(slice(1, -1))
+    if not len(between.lane):
+        return beside.part(slice(-1, None))
+    arrival = min(_nearest(between, here) + SKIP_AT_CHANGE, len(between.lane) - 1)
+    return between.part(slice(arrival, arrival + 1))
+
+
+def _cut_at_goal(edge: Edge, along: Trace, end: Snap, goal: NDArray[np.float64]) -> Trace:
+    """Ends the last edge less than two steps before the goal.
+
+    Where no point comes that near (a goal beside the road), the piece goes on to the lane's end;
+    where the goal lies behind on the same lane, one point is laid.
+    """
+    stop = np.linalg.norm(along.points[:, :3] - goal, axis=1) < 2.0 * STEP_M
+    begin = len(edge.trace.lane) - len(along.lane)
+    behind = _nearest(edge.trace, end.place) < begin
+    if behind:
+        stop |= along.lane == end.lane
+    return along.part(slice(0, int(np.argmax(stop)) + 1 if stop.any() else None))
+
+
+def _nearest(trace: Trace, here: Trace) -> int:
+    """Index of the point of a trace nearest to a place, the first of equals."""
+    return int(np.argmin(np.linalg.norm(trace.points[:, :3] - here.points[0, :3], axis=1)))
+
+
+def _turn_option(graph: RoadGraph, edges: Sequence[Edge], i: int, turns: _TurnMemory) -> RoadOption:
+    """The command on edge `i`: one for all lanes of a junction, decided where it is entered."""
+    edge = edges[i]
+    option = edge.option
+    if i > 0:
+        crossing = edge.in_junction and option == RoadOption.LANEFOLLOW
+        before = edges[i - 1]
+        if (
+            crossing
+            and turns.last_option != RoadOption.VOID
+            and turns.junction_exit > 0
+            and turns.junction_exit != before.source
+        ):
+            option = turns.last_option
+        else:
+            turns.junction_exit = -1
+            if crossing and before.option == RoadOption.LANEFOLLOW and not before.in_junction:
+                tail = _last_in_junction(edges, i)
+                turns.junction_exit = tail.target
+                option = _turn_of(graph, before, edge, tail)
+    turns.last_option = option
+    return option
+
+
+def _last_in_junction(edges: Sequence[Edge], i: int) -> Edge:
+    """The last of the junction edges that follow one another from edge `i` on."""
+    last = edges[i]
+    for edge in edges[i:]:
+        if edge.option != RoadOption.LANEFOLLOW or not edge.in_junction:
+            break
+        last = edge
+    return last
+
+
+def _turn_of(graph: RoadGraph, before: Edge, edge: Edge, tail: Edge) -> RoadOption:
+    """Left, right or straight, by direction and by the other ways out of the same node."""
+    ahead = before.exit_direction
+    others = [
+        _cross(ahead, other.chord)
+        for node, other in graph.edges[edge.source].items()
+        if other.option == RoadOption.LANEFOLLOW and node != edge.target
+    ] or [0.0]
+    to_right = _cross(ahead, tail.exit_direction)
+    cosine = ahead[0] * tail.exit_direction[0] + ahead[1] * tail.exit_direction[1]
+    if math.acos(min(1.0, max(-1.0, cosine))) < STRAIGHT_BELOW_RAD:
+        return RoadOption.STRAIGHT
+    if to_right < min(others):
+        return RoadOption.LEFT
+    if to_right > max(others):
+        return RoadOption.RIGHT
+    return RoadOption.LEFT if to_right < 0.0 else RoadOption.RIGHT
+
+
+def _cross(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Positive where `b` points to the right of `a` (y is south)."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _plan_of(
+    town: Town,
+    route_id: str,
+    keypoints: NDArray[np.float64],
+    trace: Trace,
+    option: NDArray[np.int8],
+) -> RoutePlan:
+    points = trace.points.copy()
+    points[:, 3] = (points[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
+    step_m = np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1)
+    return RoutePlan(
+        route_id=route_id,
+        town=town.name,
+        keypoints=_read_only(keypoints),
+        points=_read_only(points),
+        option=_read_only(option),
+        lane=_read_only(trace.lane),
+        lane_m=_read_only(trace.lane_m),
+        route_m=_read_only(np.concatenate([[0.0], np.cumsum(step_m)])),
+        targets=_read_only(target_indices(points, option)),
+        geo_origin=town.geo_origin,
+    )
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
+
+
+def _text(position: NDArray[np.float64]) -> str:
+    x, y, z = position[:3]
+    return f"({x:.1f}, {y:.1f}, {z:.1f})"
+
+
+def _lane_text(graph: RoadGraph, snap: Snap) -> str:
+    lanes = graph.town.lanes
+    road = graph.town.road_names[lanes.road[snap.lane]]
+    return f"road {road} lane {lanes.lane_id[snap.lane]} at {_text(snap.place.points[0])}"

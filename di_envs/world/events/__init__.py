@@ -1,0 +1,1 @@
+"""What the rules count, each by the rule of its own module, and progress along the route."""

@@ -1,0 +1,132 @@
+# mypy: disallow_untyped_defs=False
+"""Running a stop sign, by Leaderboard 1.0, with its traps.
+
+A sign is watched once its trigger box lies on the lane ahead. The fine comes when the box is no
+longer ahead, the ego never stood, and its centre had been in a box of the same size around the
+*sign* (not around its trigger): a sign that stands far from its lane never fines.
+
+Boxes are parallel to the world's axes. Where a trigger box is turned, we take the box around it;
+CARLA's rule leaves its sides unturned, which is the same up to their order for streets along the
+axes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import SignalKind
+from di_envs.town.queries import pose_at
+from di_envs.world.bodies import SAME_LEVEL_M
+from di_envs.world.events.rows import record
+from di_envs.world.state import EventKind
+
+NEAR_M = 50.0  # from the sign, beyond which it is not looked at
+STEPS_AHEAD = 20  # lane points of one metre's step that are looked at
+STEP_M = 1.0
+LANE_LOOK_M = 40.0  # at most, from an ego to its lane
+STOOD_BELOW_MPS = 0.1
+
+STOP, STOP_SIGN = int(SignalKind.STOP), int(EventKind.STOP_SIGN)
+
+
+@kernel
+def _box_extent(signals, sign):
+    """Half sides along x and y [m] of the axis-parallel box around the trigger box."""
+    cos, sin = abs(math.cos(signals.box[sign, 3])), abs(math.sin(signals.box[sign, 3]))
+    half_length, half_width = signals.box[sign, 4], signals.box[sign, 5]
+    return half_length * cos + half_width * sin, half_length * sin + half_width * cos
+
+
+@kernel
+def _inside(x, y, z, centre, extent_x, extent_y):
+    """Whether a point lies in the box around `centre` (x, y, z, …), at its level."""
+    beside = abs(x - centre[0]) < extent_x and abs(y - centre[1]) < extent_y
+    return beside and abs(z - centre[2]) < SAME_LEVEL_M
+
+
+@kernel
+def _may_be_ahead(now, pole, box, extent_x, extent_y):
+    """Necessary conditions for a sign's box to lie on the lane ahead, quick to check."""
+    dx, dy, dz = pole[0] - now.x, pole[1] - now.y, pole[2] - now.z
+    if dx * dx + dy * dy + dz * dz > NEAR_M * NEAR_M:
+        return False
+    # the lane's points start at most the look's width from the ego and reach 20 m
+    reach = STEPS_AHEAD * STEP_M + LANE_LOOK_M + extent_x + extent_y
+    return math.hypot(box[0] - now.x, box[1] - now.y) < reach
+
+
+@kernel
+def is_ahead(lanes, signals, now, sign):
+    """Whether the ego, or one of the next 20 m of its lane, is in the sign's trigger box."""
+    extent_x, extent_y = _box_extent(signals, sign)
+    box = signals.box[sign]
+    if not _may_be_ahead(now, signals.pose[sign], box, extent_x, extent_y):
+        return False
+    if _inside(now.x, now.y, now.z, box, extent_x, extent_y):
+        return True
+    lane, station = now.lane, now.lane_m
+    for _ in range(STEPS_AHEAD):
+        if lane < 0:
+            return False
+        station += STEP_M
+        if station > lanes.length_m[lane]:
+            station -= lanes.length_m[lane]
+            link = lanes.successor_start[lane]
+            has_next = link < lanes.successor_start[lane + 1]
+            lane = lanes.successor[link] if has_next else -1
+            if lane < 0:
+                return False
+        x, y, z, _yaw = pose_at(lanes, lane, station)
+        if _inside(x, y, z, box, extent_x, extent_y):
+            return True
+    return False
+
+
+@kernel
+def _find_sign(lanes, signals, now, lane_yaw):
+    """The first stop sign ahead, -1 where there is none or the ego heads against its lane."""
+    if now.lane < 0 or math.cos(lane_yaw - now.yaw) <= 0.0:
+        return -1
+    for sign in range(signals.kind.size):
+        if signals.kind[sign] == STOP and is_ahead(lanes, signals, now, sign):
+            return sign
+    return -1
+
+
+@kernel
+def detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n):
+    """Follows the stop sign ahead and records it when it was run.
+
+    Args:
+        state: The world; `stop_target`, `stop_done` and `stop_affected` change.
+        lanes: The town's lanes.
+        signals: The town's signals.
+        now: The ego now (`EgoNow`).
+        lane_yaw: Direction of its lane there [rad].
+        out: (N, 8) event rows.
+        n: Rows in use.
+
+    Returns:
+        The number of rows in use.
+    """
+    sign = np.int64(state.stop_target[now.ego])
+    if sign < 0:
+        state.stop_target[now.ego] = _find_sign(lanes, signals, now, lane_yaw)
+        return n
+    if now.speed < STOOD_BELOW_MPS:
+        state.stop_done[now.ego] = 1
+    pole = signals.pose[sign]
+    extent_x, extent_y = _box_extent(signals, sign)
+    if _inside(now.x, now.y, now.z, pole, extent_x, extent_y):
+        state.stop_affected[now.ego] = 1
+    if is_ahead(lanes, signals, now, sign):
+        return n
+    if state.stop_done[now.ego] == 0 and state.stop_affected[now.ego] == 1:
+        n = record(out, n, STOP_SIGN, now.ego, now.tick, pole[0], pole[1], pole[2], sign, 0.0)
+    state.stop_target[now.ego] = -1
+    state.stop_done[now.ego] = 0
+    state.stop_affected[now.ego] = 0
+    return n

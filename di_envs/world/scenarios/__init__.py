@@ -1,0 +1,1 @@
+"""The Leaderboard's scenarios: what triggers them, and who acts in each."""

@@ -1,0 +1,170 @@
+# mypy: disallow_untyped_defs=False
+"""How vehicles move along their lanes: drawn ways, lane changes under way, axles on the lane."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from di_envs.numerics.kernels import kernel
+from di_envs.numerics.keyed_random import Stream, keyed_hash
+from di_envs.town.queries import pose_at
+from di_envs.world.state import PATH_LANES, TICK_S, ActorKind
+from di_envs.world.traffic.car_following import EMERGENCY_BRAKING_MPS2
+
+STILL_MPS = 0.1
+LATERAL_SPEED_MPS = 1.2  # of a lane change
+LATERAL_SHARE = 0.25  # of the forward speed, at most
+INDICATE_M = 30.0
+BRAKE_LIGHT_MPS2 = -0.8
+REROUTE_TICKS = round(20.0 / TICK_S)  # of standing still after which one leaves a full exit …
+REROUTE_EVERY_TICKS = round(2.0 / TICK_S)  # … to others, if the next draw is another way
+
+_ABSENT = int(ActorKind.ABSENT)
+_TURN_STREAM = int(Stream.TRAFFIC_TURN)
+
+
+@kernel
+def next_lane(lanes, tables, lane, seed, tick, actor, step):
+    """Draws where a vehicle goes on at the end of a lane; -1 where no usable lane follows."""
+    count = 0
+    for k in range(lanes.successor_start[lane], lanes.successor_start[lane + 1]):
+        count += tables.usable[lanes.successor[k]]
+    if count == 0:
+        return -1
+    draw = keyed_hash(seed, _TURN_STREAM, tick, actor * PATH_LANES + step)
+    pick = int(draw % np.uint64(count))
+    for k in range(lanes.successor_start[lane], lanes.successor_start[lane + 1]):
+        if tables.usable[lanes.successor[k]]:
+            if pick == 0:
+                return lanes.successor[k]
+            pick -= 1
+    return -1
+
+
+@kernel
+def choose_path(state, lanes, tables, actor, known):
+    """Fills a vehicle's path behind its first `known` lanes with drawn ones."""
+    for step in range(known, PATH_LANES):
+        last = state.path[actor, step - 1]
+        state.path[actor, step] = (
+            -1
+            if last < 0
+            else next_lane(lanes, tables, last, state.seed[()], state.tick[()], actor, step)
+        )
+
+
+@kernel
+def take_another_way(state, lanes, tables, requests, egos, vehicle_end):
+    """Who has long stood before a full exit draws a new path: so a ring of full streets dissolves.
+
+    In such a ring everybody waits for room in the next street, and none of them for a mistake.
+    """
+    for actor in range(egos, vehicle_end):
+        still = state.still_ticks[actor]
+        if requests.full[actor] and still >= REROUTE_TICKS and still % REROUTE_EVERY_TICKS == 0:
+            if requests.way_step[actor] == 1 and state.grant[actor] < 0:
+                choose_path(state, lanes, tables, actor, 1)
+
+
+@kernel
+def move_vehicle(state, lanes, tables, actor, acceleration, cap):
+    """Moves a vehicle along its path for one tick and places its body."""
+    speed = state.speed[actor]
+    moved = min(speed + acceleration * TICK_S, cap)
+    moved = max(moved, speed - EMERGENCY_BRAKING_MPS2 * TICK_S, 0.0)
+    state.acceleration[actor] = (moved - speed) / TICK_S
+    state.speed[actor] = moved
+    state.lane_m[actor] += moved * TICK_S
+    if state.leaving[actor] >= 0:
+        state.leaving_m[actor] += moved * TICK_S
+        if state.leaving_m[actor] >= state.half_length[actor]:
+            state.leaving[actor] = -1
+    state.still_ticks[actor] = state.still_ticks[actor] + 1 if moved < STILL_MPS else 0
+    _enter_next_lane(state, lanes, tables, actor)
+    _drift_to_centre(state, actor, moved)
+    state.brake_light[actor] = 1 if state.acceleration[actor] < BRAKE_LIGHT_MPS2 else 0
+    state.indicator[actor] = _indicator(state, lanes, actor)
+    yaw = state.yaw[actor]
+    place_vehicle(state, lanes, actor)
+    turn = state.yaw[actor] - yaw
+    turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+    state.yaw_rate[actor] = turn / TICK_S
+
+
+@kernel
+def _enter_next_lane(state, lanes, tables, actor):
+    lane = state.lane[actor]
+    if state.lane_m[actor] < lanes.length_m[lane]:
+        return
+    ahead = state.path[actor, 1]
+    if ahead < 0:
+        state.lane_m[actor] = lanes.length_m[lane]
+        state.speed[actor] = 0.0
+        return
+    state.lane_m[actor] -= lanes.length_m[lane]
+    state.lane[actor] = ahead
+    state.previous_lane[actor] = lane
+    state.changing_from[actor] = -1
+    for step in range(PATH_LANES - 1):
+        state.path[actor, step] = state.path[actor, step + 1]
+    choose_path(state, lanes, tables, actor, PATH_LANES - 1)
+
+
+@kernel
+def _drift_to_centre(state, actor, speed):
+    """Goes on with a lane change: sideways no faster than the forward speed lets it look real."""
+    offset = state.lateral_m[actor]
+    if offset == 0.0:
+        return
+    step = min(LATERAL_SPEED_MPS, LATERAL_SHARE * speed) * TICK_S
+    if abs(offset) <= step:
+        state.lateral_m[actor] = 0.0
+        state.changing_from[actor] = -1
+    else:
+        state.lateral_m[actor] = offset - math.copysign(step, offset)
+
+
+@kernel
+def _indicator(state, lanes, actor):
+    if state.lateral_m[actor] != 0.0:
+        return 1 if state.lateral_m[actor] < 0.0 else -1
+    lane = state.lane[actor]
+    if lanes.length_m[lane] - state.lane_m[actor] < INDICATE_M and state.path[actor, 1] >= 0:
+        if lanes.junction[lane] < 0:
+            lane = state.path[actor, 1]
+    turn = lanes.turn[lane]
+    return -1 if turn == 1 else (1 if turn == 2 else 0)
+
+
+@kernel
+def place_vehicle(state, lanes, actor):
+    """Sets a vehicle's pose: its axles run on the lane, so long bodies swing as they do."""
+    axle = 0.6 * state.half_length[actor]
+    front_x, front_y, front_z, _ = _point_on_path(state, lanes, actor, axle)
+    rear_x, rear_y, rear_z, _ = _point_on_path(state, lanes, actor, -axle)
+    yaw = math.atan2(front_y - rear_y, front_x - rear_x)
+    lateral = state.lateral_m[actor]
+    if lateral != 0.0:
+        side_x, side_y = -math.sin(yaw) * lateral, math.cos(yaw) * lateral
+        front_x, front_y = front_x + side_x, front_y + side_y
+        rear_x, rear_y = rear_x + side_x, rear_y + side_y
+        share = min(LATERAL_SPEED_MPS / max(state.speed[actor], 1e-3), LATERAL_SHARE)
+        yaw -= math.copysign(math.atan(share * min(1.0, abs(lateral))), lateral)
+    state.x[actor] = 0.5 * (front_x + rear_x)
+    state.y[actor] = 0.5 * (front_y + rear_y)
+    state.z[actor] = 0.5 * (front_z + rear_z)
+    state.yaw[actor] = yaw
+
+
+@kernel
+def _point_on_path(state, lanes, actor, ahead_m):
+    s = state.lane_m[actor] + ahead_m
+    lane = state.lane[actor]
+    if s < 0.0 and state.previous_lane[actor] >= 0:
+        before = state.previous_lane[actor]
+        return pose_at(lanes, before, lanes.length_m[before] + s)
+    if s > lanes.length_m[lane] and state.path[actor, 1] >= 0:
+        return pose_at(lanes, state.path[actor, 1], s - lanes.length_m[lane])
+    return pose_at(lanes, lane, s)

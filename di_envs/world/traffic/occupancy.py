@@ -1,0 +1,215 @@
+# mypy: disallow_untyped_defs=False
+"""Who is where on the lanes: per tick, each lane's bodies in order, and the search for a leader.
+
+A body lies on every lane that it overlaps: its own, the one its tail has not left, the one a lane
+change leaves, and for a free body (an ego) each lane below its box.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.kernels import kernel
+from di_envs.town.queries import project_to_lane
+from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind
+from di_envs.world.traffic.car_following import NO_LEADER_M
+
+_ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
+
+
+@by_reference
+class Occupancy(NamedTuple):
+    """Scratch of one tick: bodies as linked lists by lane, ordered by their rear stations."""
+
+    first: NDArray[np.int32]  # (L,) first body of a lane, -1 for none
+    next: NDArray[np.int32]  # (N,) the body ahead of it on the lane, -1 for none
+    actor: NDArray[np.int32]  # (N,)
+    rear_m: NDArray[np.float64]  # (N,) lane stations
+    front_m: NDArray[np.float64]  # (N,)
+    speed: NDArray[np.float64]  # (N,) along the lane, not negative
+    size: NDArray[np.int32]  # (1,) bodies in use
+    holder: NDArray[np.int32]  # (L,) first vehicle that holds the grant for a junction lane, or -1
+    next_holder: NDArray[np.int32]  # (A,)
+    leaver: NDArray[np.int32]  # (L,) first vehicle that is leaving a junction lane, or -1
+    next_leaver: NDArray[np.int32]  # (A,)
+
+
+def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
+    """Allocates the scratch for `lanes` lanes and `actors` actors, `egos` of them free bodies."""
+    bodies = 4 * actors + OCCUPIED_LANES * egos
+    return Occupancy(
+        first=np.full(lanes, -1, np.int32),
+        next=np.full(bodies, -1, np.int32),
+        actor=np.full(bodies, -1, np.int32),
+        rear_m=np.zeros(bodies),
+        front_m=np.zeros(bodies),
+        speed=np.zeros(bodies),
+        size=np.zeros(1, np.int32),
+        holder=np.full(lanes, -1, np.int32),
+        next_holder=np.full(actors, -1, np.int32),
+        leaver=np.full(lanes, -1, np.int32),
+        next_leaver=np.full(actors, -1, np.int32),
+    )
+
+
+@kernel
+def insert_body(occupancy, lane, actor, rear_m, front_m, speed):
+    """Adds a body to a lane's list, in order."""
+    body = occupancy.size[0]
+    occupancy.size[0] = body + 1
+    occupancy.actor[body] = actor
+    occupancy.rear_m[body] = rear_m
+    occupancy.front_m[body] = front_m
+    occupancy.speed[body] = speed
+    behind = -1
+    ahead = occupancy.first[lane]
+    while ahead >= 0 and occupancy.rear_m[ahead] < rear_m:
+        behind = ahead
+        ahead = occupancy.next[ahead]
+    occupancy.next[body] = ahead
+    if behind < 0:
+        occupancy.first[lane] = body
+    else:
+        occupancy.next[behind] = body
+
+
+@kernel
+def fill_occupancy(occupancy, state, lanes, egos, vehicle_end):
+    """Rebuilds all lists from the state: egos [0, egos), vehicles [egos, vehicle_end)."""
+    occupancy.first[:] = -1
+    occupancy.holder[:] = -1
+    occupancy.leaver[:] = -1
+    occupancy.size[0] = 0
+    for ego in range(egos):
+        _insert_free_body(occupancy, state, lanes, ego)
+    for actor in range(egos, vehicle_end):
+        if state.kind[actor] != _ABSENT and state.lane[actor] >= 0:
+            insert_vehicle(occupancy, state, lanes, actor)
+            grant = state.grant[actor]
+            if grant >= 0:
+                occupancy.next_holder[actor] = occupancy.holder[grant]
+                occupancy.holder[grant] = actor
+            leaving = state.leaving[actor]
+            if leaving >= 0:
+                occupancy.next_leaver[actor] = occupancy.leaver[leaving]
+                occupancy.leaver[leaving] = actor
+
+
+@kernel
+def insert_vehicle(occupancy, state, lanes, actor):
+    """Adds a vehicle on its own lane, behind it and beside it, as far as its body reaches."""
+    lane = state.lane[actor]
+    s, half, speed = state.lane_m[actor], state.half_length[actor], state.speed[actor]
+    insert_body(occupancy, lane, actor, s - half, s + half, speed)
+    before = state.previous_lane[actor]
+    if before >= 0 and s < half:
+        length = lanes.length_m[before]
+        insert_body(occupancy, before, actor, length + s - half, length + s + half, speed)
+    beside = state.changing_from[actor]
+    if beside >= 0:
+        s *= lanes.length_m[beside] / lanes.length_m[lane]
+        insert_body(occupancy, beside, actor, s - half, s + half, speed)
+
+
+@kernel
+def _insert_free_body(occupancy, state, lanes, actor):
+    half_length, half_width = state.half_length[actor], state.half_width[actor]
+    for k in range(OCCUPIED_LANES):
+        lane = state.occupied[actor, k]
+        if lane < 0:
+            break
+        s, _ = project_to_lane(lanes, lane, state.x[actor], state.y[actor])
+        point = lanes.first[lane] + min(
+            max(int(s / lanes.spacing_m[lane]), 0), lanes.count[lane] - 1
+        )
+        angle = state.yaw[actor] - lanes.points[point, 3]
+        along = abs(math.cos(angle)) * half_length + abs(math.sin(angle)) * half_width
+        speed = max(state.speed[actor] * math.cos(angle), 0.0)
+        insert_body(occupancy, lane, actor, s - along, s + along, speed)
+
+
+@kernel
+def body_ahead(occupancy, lane, actor, s):
+    """The first body on a lane, not the actor's own, with its middle ahead of station s; or -1."""
+    body = occupancy.first[lane]
+    while body >= 0:
+        if occupancy.actor[body] != actor:
+            middle = 0.5 * (occupancy.rear_m[body] + occupancy.front_m[body])
+            if middle > s or (middle == s and occupancy.actor[body] > actor):
+                return body
+        body = occupancy.next[body]
+    return -1
+
+
+@kernel
+def body_behind(occupancy, lane, actor, s):
+    """The last body on a lane, not the actor's own, whose middle lies behind station s; or -1."""
+    found = -1
+    body = occupancy.first[lane]
+    while body >= 0:
+        if occupancy.actor[body] != actor:
+            if 0.5 * (occupancy.rear_m[body] + occupancy.front_m[body]) <= s:
+                found = body
+        body = occupancy.next[body]
+    return found
+
+
+@kernel
+def _nearest_sibling(occupancy, tables, lane, actor, s, best_rear):
+    """A body on a junction lane that forks from the same approach lane, where both overlap."""
+    found = -1
+    for k in range(tables.sibling_start[lane], tables.sibling_start[lane + 1]):
+        body = occupancy.first[tables.sibling_lane[k]]
+        while body >= 0:
+            rear = occupancy.rear_m[body]
+            middle = 0.5 * (rear + occupancy.front_m[body])
+            if (
+                occupancy.actor[body] != actor
+                and middle > s
+                and rear < tables.sibling_end_m[k]
+                and rear < best_rear
+            ):
+                best_rear = rear
+                found = body
+            body = occupancy.next[body]
+    return found
+
+
+@kernel
+def find_leader(occupancy, lanes, tables, path, actor, s, front, look_m):
+    """The first body ahead along a path of lanes.
+
+    Args:
+        path: (PATH_LANES,) lanes, the first one being where station `s` lies.
+        s: Station of the actor's middle on the first lane [m].
+        front: Station of its front [m].
+        look_m: How far ahead of the front to look.
+
+    Returns:
+        (gap to its rear [m], its speed along the lane [m/s], its actor id), or
+        (NO_LEADER_M, 0, -1).
+    """
+    offset = -front
+    for step in range(PATH_LANES):
+        lane = path[step]
+        if lane < 0 or offset > look_m:
+            break
+        here = s if step == 0 else -NO_LEADER_M
+        body = body_ahead(occupancy, lane, actor, here)
+        if tables.sibling_start[lane] != tables.sibling_start[lane + 1]:
+            rear = occupancy.rear_m[body] if body >= 0 else NO_LEADER_M
+            sibling = _nearest_sibling(occupancy, tables, lane, actor, here, rear)
+            if sibling >= 0:
+                body = sibling
+        if body >= 0:
+            gap = offset + occupancy.rear_m[body]
+            if gap > look_m:
+                break
+            return gap, occupancy.speed[body], occupancy.actor[body]
+        offset += lanes.length_m[lane]
+    return NO_LEADER_M, 0.0, -1

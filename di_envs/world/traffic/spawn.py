@@ -1,0 +1,158 @@
+"""Traffic at the start of an episode: who drives, and where, drawn from the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
+from di_envs.town.lanes import Lanes
+from di_envs.town.plan import RoutePlan
+from di_envs.world.state import ActorKind, State
+from di_envs.world.traffic.motion import choose_path, place_vehicle
+from di_envs.world.traffic.tables import TrafficTables
+
+SPOT_SPACING_M = 12.0  # more than the longest vehicle with a gap
+END_MARGIN_M = 8.0  # free at both ends of a lane
+EGO_CLEARANCE_M = 15.0  # free around an ego's start, on all lanes
+ROUTE_CLEARANCE_M = 30.0  # free of vehicles at the beginning of an ego's route
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleModel:
+    """A sort of vehicle: its box, how common it is, and how fast it goes."""
+
+    kind: ActorKind
+    share: float  # of all vehicles
+    length_m: float
+    width_m: float
+    height_m: float
+    speed_factor: tuple[float, float]  # of the speed limit, lowest and highest driver
+
+
+VEHICLES = (
+    VehicleModel(
+        kind=ActorKind.CAR,
+        share=0.70,
+        length_m=4.6,
+        width_m=1.9,
+        height_m=1.5,
+        speed_factor=(0.85, 1.1),
+    ),
+    VehicleModel(
+        kind=ActorKind.VAN,
+        share=0.10,
+        length_m=5.6,
+        width_m=2.0,
+        height_m=2.3,
+        speed_factor=(0.85, 1.05),
+    ),
+    VehicleModel(
+        kind=ActorKind.TRUCK,
+        share=0.05,
+        length_m=7.0,
+        width_m=2.4,
+        height_m=3.0,
+        speed_factor=(0.75, 0.95),
+    ),
+    VehicleModel(
+        kind=ActorKind.BUS,
+        share=0.04,
+        length_m=8.6,
+        width_m=2.4,
+        height_m=3.1,
+        speed_factor=(0.75, 0.95),
+    ),
+    VehicleModel(
+        kind=ActorKind.MOTORCYCLE,
+        share=0.07,
+        length_m=2.2,
+        width_m=0.8,
+        height_m=1.5,
+        speed_factor=(0.9, 1.1),
+    ),
+    VehicleModel(
+        kind=ActorKind.BICYCLE,
+        share=0.04,
+        length_m=1.8,
+        width_m=0.6,
+        height_m=1.7,
+        speed_factor=(0.4, 0.5),
+    ),
+)
+
+
+def spawn_traffic(
+    state: State,
+    lanes: Lanes,
+    tables: TrafficTables,
+    plans: tuple[RoutePlan, ...],
+    first: int,
+    count: int,
+) -> None:
+    """Places `count` vehicles in the slots from `first` on, at rest, never on an ego's path.
+
+    Raises:
+        ValueError: If the town has fewer free places than vehicles.
+    """
+    seed = int(state.seed[()])
+    spots = _spots(lanes, tables, plans, seed)
+    if len(spots) < count:
+        raise ValueError(
+            f"expected room for {count} vehicles, but the town has {len(spots)} free places; "
+            f"ask for fewer (traffic={len(spots)})"
+        )
+    for actor, (lane, station) in enumerate(spots[:count], first):
+        _equip(state, actor, seed)
+        state.lane[actor] = lane
+        state.lane_m[actor] = station
+        state.path[actor, 0] = lane
+        choose_path(state, lanes, tables, actor, 1)
+        place_vehicle(state, lanes, actor)
+
+
+def _spots(
+    lanes: Lanes, tables: TrafficTables, plans: tuple[RoutePlan, ...], seed: int
+) -> list[tuple[int, float]]:
+    """Free places on lanes outside junctions, in an order drawn from the seed."""
+    places = []
+    for lane in np.flatnonzero((tables.usable == 1) & (lanes.junction < 0)):
+        stations = np.arange(END_MARGIN_M, lanes.length_m[lane] - END_MARGIN_M, SPOT_SPACING_M)
+        places += [(int(lane), float(station)) for station in stations]
+    xyz = np.array([_middle(lanes, lane, station) for lane, station in places]).reshape(-1, 3)
+    free = np.ones(len(places), bool)
+    for plan in plans:
+        near = plan.points[plan.route_m <= ROUTE_CLEARANCE_M, :3]
+        for k, point in enumerate(near):
+            reach = EGO_CLEARANCE_M if k == 0 else 0.5 * SPOT_SPACING_M
+            free &= np.linalg.norm(xyz - point, axis=1) > reach
+    order = sorted(
+        np.flatnonzero(free).tolist(),
+        key=lambda k: (int(keyed_hash(seed, int(Stream.TRAFFIC_SPAWN), 0, k)), k),
+    )
+    return [places[k] for k in order]
+
+
+def _middle(lanes: Lanes, lane: int, station: float) -> NDArray[np.float64]:
+    index = lanes.first[lane] + int(station / lanes.spacing_m[lane])
+    point: NDArray[np.float64] = lanes.points[index, :3]
+    return point
+
+
+def _equip(state: State, actor: int, seed: int) -> None:
+    """Draws what a vehicle is and how fast its driver likes to go."""
+    stream = int(Stream.TRAFFIC_DRIVER)
+    draw, model = uniform(seed, stream, 0, actor), VEHICLES[-1]
+    for candidate in VEHICLES:
+        if draw < candidate.share:
+            model = candidate
+            break
+        draw -= candidate.share
+    low, high = model.speed_factor
+    state.kind[actor] = model.kind
+    state.half_length[actor] = model.length_m / 2.0
+    state.half_width[actor] = model.width_m / 2.0
+    state.height[actor] = model.height_m
+    state.desired_factor[actor] = low + (high - low) * uniform(seed, stream, 1, actor)

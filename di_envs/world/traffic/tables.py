@@ -1,0 +1,125 @@
+"""What traffic needs of a town beyond its lanes, computed once: speeds, side lanes, crosswalks."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.numerics.bundles import by_reference
+from di_envs.town.lanes import LaneKind
+from di_envs.town.town import Town
+
+LATERAL_ACCELERATION_MPS2 = 2.0  # that drivers accept in bends
+SLOWING_MPS2 = 2.0  # with which they slow down for a bend ahead
+SLOWEST_BEND_MPS = 3.0
+
+
+@by_reference
+class TrafficTables(NamedTuple):
+    """Arrays over the lanes L, points P and crosswalks X of a town."""
+
+    point_speed: NDArray[np.float64]  # (P,) speed limit, bends and slowing for them included [m/s]
+    usable: NDArray[np.int8]  # (L,) 1 where traffic can drive on for ever
+    # junction lanes that begin at the same approach lane: they overlap up to `sibling_end_m`
+    sibling_start: NDArray[np.int32]  # (L + 1,)
+    sibling_lane: NDArray[np.int32]
+    sibling_end_m: NDArray[np.float64]
+    # crosswalks that lie on a lane
+    crossing_start: NDArray[np.int32]  # (L + 1,)
+    crossing: NDArray[np.int32]  # crosswalk index
+    crossing_begin_m: NDArray[np.float64]
+    crossing_end_m: NDArray[np.float64]
+
+
+def traffic_tables(town: Town) -> TrafficTables:
+    """Computes the tables of a town."""
+    siblings = _siblings(town)
+    crossings = _crossings(town)
+    return TrafficTables(
+        point_speed=_point_speeds(town),
+        usable=_usable_lanes(town),
+        sibling_start=siblings[0],
+        sibling_lane=siblings[1],
+        sibling_end_m=siblings[2],
+        crossing_start=crossings[0],
+        crossing=crossings[1],
+        crossing_begin_m=crossings[2],
+        crossing_end_m=crossings[3],
+    )
+
+
+def _point_speeds(town: Town) -> NDArray[np.float64]:
+    lanes = town.lanes
+    speeds = np.empty(lanes.points.shape[0])
+    for lane in range(lanes.kind.size):
+        own = slice(lanes.first[lane], lanes.first[lane] + lanes.count[lane])
+        spacing = lanes.spacing_m[lane]
+        yaw = lanes.points[own, 3]
+        curvature = np.abs(np.gradient(yaw, spacing)) if yaw.size > 2 else np.zeros(yaw.size)
+        bend = np.sqrt(LATERAL_ACCELERATION_MPS2 / np.maximum(curvature, 1e-6))
+        speed = np.minimum(lanes.speed_limit_mps[lane], np.maximum(bend, SLOWEST_BEND_MPS))
+        for k in range(speed.size - 2, -1, -1):
+            reachable = np.sqrt(speed[k + 1] ** 2 + 2.0 * SLOWING_MPS2 * spacing)
+            speed[k] = min(speed[k], reachable)
+        speeds[own] = speed
+    return speeds
+
+
+def _usable_lanes(town: Town) -> NDArray[np.int8]:
+    """Driving lanes that lead on for ever: those without a usable successor go, until none does."""
+    lanes = town.lanes
+    usable = (lanes.kind == LaneKind.DRIVING) & (lanes.length_m > 0.0)
+    changed = True
+    while changed:
+        changed = False
+        for lane in np.flatnonzero(usable):
+            ahead = lanes.successor[lanes.successor_start[lane] : lanes.successor_start[lane + 1]]
+            if not usable[ahead].any():
+                usable[lane] = False
+                changed = True
+    return usable.astype(np.int8)
+
+
+def _siblings(
+    town: Town,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    lanes = town.lanes
+    start, other, end = [0], [], []
+    for lane in range(lanes.kind.size):
+        for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
+            if lanes.conflict_begin_m[k] < 0.5 and lanes.conflict_other_begin_m[k] < 0.5:
+                if _share_predecessor(town, lane, int(lanes.conflict_lane[k])):
+                    other.append(int(lanes.conflict_lane[k]))
+                    end.append(float(lanes.conflict_other_end_m[k]))
+        start.append(len(other))
+    return np.array(start, np.int32), np.array(other, np.int32), np.array(end, np.float64)
+
+
+def _share_predecessor(town: Town, a: int, b: int) -> bool:
+    lanes = town.lanes
+    before = [
+        set(lanes.predecessor[lanes.predecessor_start[i] : lanes.predecessor_start[i + 1]].tolist())
+        for i in (a, b)
+    ]
+    return a != b and bool(before[0] & before[1])
+
+
+def _crossings(
+    town: Town,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    walks = town.crosswalks
+    rows: list[list[tuple[float, float, int]]] = [[] for _ in range(town.lanes.kind.size)]
+    for crosswalk in range(walks.width_m.size):
+        for k in range(walks.crossed_start[crosswalk], walks.crossed_start[crosswalk + 1]):
+            begin, end = float(walks.crossed_begin_m[k]), float(walks.crossed_end_m[k])
+            rows[walks.crossed_lane[k]].append((begin, end, crosswalk))
+    flat = [entry for row in rows for entry in sorted(row)]
+    start = np.cumsum([0] + [len(row) for row in rows])
+    return (
+        start.astype(np.int32),
+        np.array([entry[2] for entry in flat], np.int32),
+        np.array([entry[0] for entry in flat], np.float64),
+        np.array([entry[1] for entry in flat], np.float64),
+    )

@@ -1,0 +1,1 @@
+"""People on foot: where they walk, when they cross, and how they keep apart."""

@@ -1,0 +1,161 @@
+# mypy: disallow_untyped_defs=False
+"""When a walker may step onto a crosswalk, and what stops one who is on it."""
+
+from __future__ import annotations
+
+import math
+
+from di_envs.numerics.geometry import boxes_overlap
+from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import LightState
+from di_envs.world.bodies import SAME_LEVEL_M
+from di_envs.world.lights import TURN_TICKS
+from di_envs.world.state import TICK_S, ActorKind
+
+COMFORTABLE_MPS2 = 2.5  # braking that walkers expect of drivers …
+REACTION_S = 0.7  # … after this time …
+ROOM_M = 3.0  # … to a stop this far before the strip
+STANDS_MPS = 0.3  # a vehicle slower than this is taken to stand
+SPARE_TICKS = round(1.0 / TICK_S)  # of red left when a walker has crossed
+BODY_M = 0.25  # half a walker's width
+LOOK_S = 1.0  # of a vehicle's way ahead that walkers do not step into
+
+RED = int(LightState.RED)
+FIRST_VEHICLE, LAST_VEHICLE = int(ActorKind.CAR), int(ActorKind.BICYCLE)
+
+
+@kernel
+def is_vehicle(kind):
+    return FIRST_VEHICLE <= kind <= LAST_VEHICLE
+
+
+@kernel
+def ticks_to_green(signals, signal, phase_group, phase_ticks):
+    """Ticks until a light that is red turns green; phases are those of its junction."""
+    groups = signals.groups[signals.junction[signal]]
+    turns = (signals.group[signal] - phase_group) % groups
+    if turns == 0:  # its own turn is at its end
+        turns = groups
+    return turns * TURN_TICKS - phase_ticks
+
+
+@kernel
+def _lights_hold(state, walk, signals, crosswalk, needed_ticks):
+    """Whether every light of the crossed arm is red, and stays so for long enough.
+
+    Nobody knows how long a light that is forced stays as it is.
+    """
+    for k in range(walk.light_start[crosswalk], walk.light_start[crosswalk + 1]):
+        signal = walk.light[k]
+        junction = signals.junction[signal]
+        if state.light[signal] != RED or state.forced_light[signal] != 0:
+            return False
+        left = ticks_to_green(
+            signals, signal, state.phase_group[junction], state.phase_ticks[junction]
+        )
+        if left < needed_ticks + SPARE_TICKS:
+            return False
+    return True
+
+
+@kernel
+def _is_on_strip(state, strip, actor):
+    if abs(state.z[actor] - strip[2]) >= SAME_LEVEL_M:
+        return False
+    return boxes_overlap(
+        strip[0],
+        strip[1],
+        strip[3],
+        strip[4],
+        strip[5],
+        state.x[actor],
+        state.y[actor],
+        state.yaw[actor],
+        state.half_length[actor],
+        state.half_width[actor],
+    )
+
+
+@kernel
+def could_stop(speed_mps, gap_m):
+    """Whether a vehicle could stop comfortably before a strip, or stands before it."""
+    needed = speed_mps * speed_mps / (2.0 * COMFORTABLE_MPS2) + REACTION_S * speed_mps
+    if speed_mps >= STANDS_MPS:
+        needed += ROOM_M
+    return gap_m >= needed
+
+
+@kernel
+def _goes_over(state, actor, lane):
+    """Whether a vehicle's chosen path has this lane; an ego's is unknown, so it might."""
+    found = actor < state.throttle.size
+    for k in range(state.path.shape[1]):
+        found = found or state.path[actor, k] == lane
+    return found
+
+
+@kernel
+def _leaves_room(state, walk, crosswalk, actor):
+    """Whether a vehicle is off the strip, and not heading for it or able to stop comfortably."""
+    if _is_on_strip(state, walk.strip[crosswalk], actor):
+        return False
+    lane = state.lane[actor]
+    if lane < 0:
+        return True
+    front = state.lane_m[actor] + state.half_length[actor]
+    rear = state.lane_m[actor] - state.half_length[actor]
+    for k in range(walk.approach_start[lane], walk.approach_start[lane + 1]):
+        if walk.approach[k] != crosswalk or rear >= walk.approach_end_m[k]:
+            continue
+        if could_stop(state.speed[actor], walk.approach_begin_m[k] - front):
+            continue
+        if _goes_over(state, actor, walk.approach_lane[k]):
+            return False
+    return True
+
+
+@kernel
+def may_cross(state, walk, signals, crosswalk, needed_ticks, vehicle_end):
+    """Whether a walker who needs so many ticks may step onto a crosswalk now.
+
+    Egos and vehicles, which are looked out for, are the actors before `vehicle_end`.
+    """
+    if not _lights_hold(state, walk, signals, crosswalk, needed_ticks):
+        return False
+    for actor in range(vehicle_end):
+        if is_vehicle(state.kind[actor]) and not _leaves_room(state, walk, crosswalk, actor):
+            return False
+    return True
+
+
+@kernel
+def is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m, look_s):
+    """Whether a step from (x, y) would go into a vehicle, or where it will be within `look_s`.
+
+    Steps away from its middle are always free, so that nobody is held by a body beside them.
+    """
+    dx, dy = state.x[actor] - x, state.y[actor] - y
+    half_length, look = state.half_length[actor], look_s * state.speed[actor]
+    reach = half_length + look + 2.0
+    if abs(dx) > reach or abs(dy) > reach or abs(state.z[actor] - z) >= SAME_LEVEL_M:
+        return False
+    step_x, step_y = step_m * math.cos(heading), step_m * math.sin(heading)
+    if dx * step_x + dy * step_y <= 0.0:
+        return False
+    cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
+    ahead = (step_x - dx) * cos + (step_y - dy) * sin
+    right = (step_y - dy) * cos - (step_x - dx) * sin
+    room = BODY_M + margin_m
+    in_length = -half_length - room < ahead < half_length + look + room
+    return in_length and abs(right) < state.half_width[actor] + room
+
+
+@kernel
+def is_blocked(state, actors, x, y, z, heading, step_m, margin_m):
+    """Whether one of the first `actors` stands in, or drives into, a walker's next step."""
+    for actor in range(actors):
+        if is_vehicle(state.kind[actor]) and is_in_the_way(
+            state, actor, x, y, z, heading, step_m, margin_m, LOOK_S
+        ):
+            return True
+    return False

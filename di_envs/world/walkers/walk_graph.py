@@ -1,0 +1,320 @@
+"""Where walkers walk: a graph of sidewalk and crosswalk lines, built once from a town.
+
+Sidewalk lanes are kept where they are clear of driving lanes, cut where crosswalks leave them, and
+joined where their ends meet. A crosswalk's line runs from sidewalk to sidewalk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.numerics.bundles import by_reference
+from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, SignalKind, Signals
+from di_envs.town.town import Town
+from di_envs.world.walkers.lane_clearance import clearances
+
+BODY_M = 0.25  # half a walker's width
+KERB_M = 0.4  # that walkers keep from driving lanes at least …
+SWING_M = 1.0  # … and where there is room: long vehicles swing out that far in turns
+SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room
+SHORTEST_M = 3.0  # pieces of sidewalk that are worth walking
+STEP_M = 0.5  # spacing of the lines made here
+FINE_M = 0.1  # steps in which the kerb is looked for
+ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
+MEET_M = 0.5  # ends that are the same place
+JOIN_M = 3.0  # ends that a straight line joins
+LEVEL_M = 3.0
+REACH_M = 80.0  # up to which vehicles ahead of a crosswalk are looked at
+STOP_LINE_M = 25.0  # from a crosswalk, within which a stop line guards it
+
+Line = NDArray[np.float64]  # (N, 3) x, y, z
+
+
+@by_reference
+class WalkGraph(NamedTuple):
+    """Arrays over edges E, their points P, links N, crosswalks X, approaches V and lights T."""
+
+    # (E,) edges: points [first, first + size) at even spacing
+    first: NDArray[np.int32]
+    size: NDArray[np.int32]  # number of points
+    length_m: NDArray[np.float64]
+    spacing_m: NDArray[np.float64]
+    side_m: NDArray[np.float64]  # that walkers keep to the right of the line
+    crosswalk: NDArray[np.int32]  # index into Crosswalks, -1 for sidewalks
+    road_begin_m: NDArray[np.float64]  # stations between which it lies on driving lanes
+    road_end_m: NDArray[np.float64]
+    # edges to go on to: from the start of edge e at [start[2e], start[2e + 1]), from its end at
+    # [start[2e + 1], start[2e + 2])
+    next_start: NDArray[np.int32]  # (2E + 1,)
+    next_edge: NDArray[np.int32]  # (N,)
+    next_direction: NDArray[np.int8]  # (N,) 1: it is entered at its start, -1: at its end
+    points: NDArray[np.float64]  # (P, 4) x, y, z, yaw along the edge
+    strip: NDArray[np.float64]  # (X, 6) centre x, y, z, yaw along it, half length, half width
+    # lights that stop the traffic of a crosswalk's arm
+    light_start: NDArray[np.int32]  # (X + 1,)
+    light: NDArray[np.int32]  # (T,) signal index
+    # by lane: crosswalks ahead on it or on the lanes that it leads to
+    approach_start: NDArray[np.int32]  # (L + 1,)
+    approach: NDArray[np.int32]  # (V,) crosswalk
+    approach_lane: NDArray[np.int32]  # (V,) the crossed lane
+    approach_begin_m: NDArray[np.float64]  # (V,) from this lane's start to the strip
+    approach_end_m: NDArray[np.float64]  # (V,) and to its far side
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Edge:
+    line: Line
+    side_m: float = 0.0
+    crosswalk: int = -1
+    road: tuple[float, float] = (0.0, 0.0)
+
+
+def build_walk_graph(town: Town) -> WalkGraph:
+    """Builds the graph; a town without sidewalks gives one without edges."""
+    lanes, crosswalks = town.lanes, town.crosswalks
+    pieces = _clear_sidewalks(lanes)
+    ends = _attachments(pieces, crosswalks)
+    edges = [_sidewalk(lanes, line) for line in _cut(pieces, ends)]
+    edges += _links(lanes, [edge.line for edge in edges])
+    edges += _crossings(lanes, crosswalks, pieces, ends)
+    return WalkGraph(
+        **_edge_arrays(edges),
+        **_next_edges([edge.line for edge in edges]),
+        points=_points_of(edges),
+        strip=_strips(crosswalks),
+        **_lights(lanes, crosswalks, town.signals),
+        **_approaches(lanes, crosswalks),
+    )
+
+
+def _clear_sidewalks(lanes: Lanes) -> list[Line]:
+    """The runs of sidewalk points that keep clear of driving lanes."""
+    pieces = []
+    for lane in np.flatnonzero(lanes.kind == LaneKind.SIDEWALK):
+        own = lanes.points[lanes.first[lane] : lanes.first[lane] + lanes.count[lane], :3]
+        clear = np.concatenate(([False], clearances(lanes, own) >= BODY_M + KERB_M, [False]))
+        turns = np.flatnonzero(np.diff(clear))
+        for begin, end in zip(turns[::2], turns[1::2], strict=True):
+            if (end - begin - 1) * lanes.spacing_m[lane] >= SHORTEST_M:
+                pieces.append(np.array(own[begin:end]))
+    return pieces
+
+
+def _attachments(
+    pieces: list[Line], crosswalks: Crosswalks
+) -> dict[tuple[int, int], tuple[int, int]]:
+    """The sidewalk point (piece, point) of each crosswalk end (crosswalk, 0 or 1) that has one."""
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    if not pieces:
+        return found
+    points = np.concatenate(pieces)
+    piece_of = np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces])
+    first = np.cumsum([0, *(len(piece) for piece in pieces)])
+    for crosswalk in range(crosswalks.width_m.size):
+        for side, place in enumerate((crosswalks.start[crosswalk], crosswalks.end[crosswalk])):
+            level = np.abs(points[:, 2] - place[2]) < LEVEL_M
+            distance = np.where(level, np.hypot(*(points[:, :2] - place[:2]).T), np.inf)
+            nearest = int(np.argmin(distance))
+            if distance[nearest] <= ATTACH_M:
+                piece = int(piece_of[nearest])
+                found[crosswalk, side] = piece, _snapped(nearest - int(first[piece]), pieces[piece])
+    return found
+
+
+def _snapped(point: int, piece: Line) -> int:
+    """A point of a piece, or the piece's end where that is about a metre away or less."""
+    if point <= 2:
+        return 0
+    return len(piece) - 1 if point >= len(piece) - 3 else point
+
+
+def _cut(pieces: list[Line], ends: dict[tuple[int, int], tuple[int, int]]) -> list[Line]:
+    """The pieces, cut where crosswalks leave them."""
+    cuts: list[set[int]] = [{0, len(piece) - 1} for piece in pieces]
+    for piece, point in ends.values():
+        cuts[piece].add(point)
+    return [
+        piece[begin : end + 1]
+        for piece, points in zip(pieces, cuts, strict=True)
+        for begin, end in zip(sorted(points)[:-1], sorted(points)[1:], strict=True)
+    ]
+
+
+def _sidewalk(lanes: Lanes, line: Line) -> _Edge:
+    room = float(clearances(lanes, line).min()) - BODY_M - SWING_M
+    return _Edge(line=line, side_m=min(max(room, 0.0), SIDE_M))
+
+
+def _links(lanes: Lanes, lines: list[Line]) -> list[_Edge]:
+    """Straight joints between ends that nearly meet, where no driving lane lies between."""
+    ends = np.array([line[k] for line in lines for k in (0, -1)]).reshape(-1, 3)
+    links = []
+    for a in range(len(ends)):
+        near = np.linalg.norm(ends - ends[a], axis=1)
+        if np.count_nonzero(near <= MEET_M) > 1:  # it goes on by itself
+            continue
+        for b in np.flatnonzero((near > MEET_M) & (near <= JOIN_M)):
+            alone = np.count_nonzero(np.linalg.norm(ends - ends[b], axis=1) <= MEET_M) == 1
+            if b // 2 == a // 2 or (alone and b < a):  # its own other end, or done from there
+                continue
+            line = _resample(np.stack((ends[a], ends[b])))
+            if clearances(lanes, line).min() >= BODY_M + KERB_M:
+                links.append(_sidewalk(lanes, line))
+    return links
+
+
+def _crossings(
+    lanes: Lanes,
+    crosswalks: Crosswalks,
+    pieces: list[Line],
+    ends: dict[tuple[int, int], tuple[int, int]],
+) -> list[_Edge]:
+    """An edge for each crosswalk that has a sidewalk at both ends."""
+    edges = []
+    for crosswalk in range(crosswalks.width_m.size):
+        if (crosswalk, 0) not in ends or (crosswalk, 1) not in ends:
+            continue
+        a, b = (pieces[piece][point] for piece, point in (ends[crosswalk, 0], ends[crosswalk, 1]))
+        start, end = crosswalks.start[crosswalk], crosswalks.end[crosswalk]
+        line = _resample(np.stack((a, start, end, b)))
+        road = _road_part(lanes, line)
+        side = min(SIDE_M, max(0.5 * crosswalks.width_m[crosswalk] - BODY_M, 0.0))
+        edges.append(_Edge(line=line, side_m=side, crosswalk=crosswalk, road=road))
+    return edges
+
+
+def _road_part(lanes: Lanes, line: Line) -> tuple[float, float]:
+    """Stations between which a line lies on driving lanes; its end twice where it never does."""
+    length = _length(line)
+    station = np.linspace(0.0, length, max(round(length / FINE_M), 1) + 1)
+    even = np.linspace(0.0, length, len(line))
+    places = np.stack([np.interp(station, even, line[:, k]) for k in range(3)], axis=1)
+    on_road = station[clearances(lanes, places) < 0.0]
+    return (float(on_road[0]), float(on_road[-1])) if on_road.size else (length, length)
+
+
+def _length(line: Line) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _resample(line: Line) -> Line:
+    """The line through the same corners at even spacing, with corners of no length dropped."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    station = np.concatenate(([0.0], np.cumsum(steps)))
+    count = max(int(np.ceil(station[-1] / STEP_M)) + 1, 2)
+    even = np.linspace(0.0, station[-1], count)
+    return np.stack([np.interp(even, station, line[:, k]) for k in range(3)], axis=1)
+
+
+def _edge_arrays(edges: list[_Edge]) -> dict[str, Any]:
+    count = np.array([len(edge.line) for edge in edges], np.int32)
+    length = np.array([_length(edge.line) for edge in edges])
+    return {
+        "first": (np.cumsum(count) - count).astype(np.int32),
+        "size": count,
+        "length_m": length,
+        "spacing_m": length / np.maximum(count - 1, 1),
+        "side_m": np.array([edge.side_m for edge in edges], np.float64),
+        "crosswalk": np.array([edge.crosswalk for edge in edges], np.int32),
+        "road_begin_m": np.array([edge.road[0] for edge in edges], np.float64),
+        "road_end_m": np.array([edge.road[1] for edge in edges], np.float64),
+    }
+
+
+def _next_edges(lines: list[Line]) -> dict[str, Any]:
+    """Which edges begin or end where an edge begins or ends."""
+    ends = np.array([line[k] for line in lines for k in (0, -1)]).reshape(-1, 3)
+    starts, edges, directions = [0], [], []
+    for a in range(len(ends)):
+        near = np.flatnonzero(np.linalg.norm(ends - ends[a], axis=1) <= MEET_M)
+        others = near[near // 2 != a // 2]
+        edges += list(others // 2)
+        directions += list(1 - 2 * (others % 2))
+        starts.append(len(edges))
+    return {
+        "next_start": np.array(starts, np.int32),
+        "next_edge": np.array(edges, np.int32),
+        "next_direction": np.array(directions, np.int8),
+    }
+
+
+def _points_of(edges: list[_Edge]) -> NDArray[np.float64]:
+    rows = [np.empty((0, 4))]
+    for edge in edges:
+        step = np.diff(edge.line[:, :2], axis=0)
+        yaw = np.arctan2(step[:, 1], step[:, 0])
+        rows.append(np.column_stack((edge.line, np.append(yaw, yaw[-1]))))
+    return np.concatenate(rows)
+
+
+def _strips(crosswalks: Crosswalks) -> NDArray[np.float64]:
+    along = crosswalks.end - crosswalks.start
+    return np.column_stack(
+        (
+            0.5 * (crosswalks.start + crosswalks.end),
+            np.arctan2(along[:, 1], along[:, 0]),
+            0.5 * np.hypot(along[:, 0], along[:, 1]),
+            0.5 * crosswalks.width_m,
+        )
+    )
+
+
+def _lights(lanes: Lanes, crosswalks: Crosswalks, signals: Signals) -> dict[str, Any]:
+    """The lights at the stop lines before which, or shortly after which, a crosswalk lies."""
+    starts, lights = [0], []
+    for crosswalk in range(crosswalks.width_m.size):
+        found = set()
+        for k in range(
+            crosswalks.crossed_start[crosswalk], crosswalks.crossed_start[crosswalk + 1]
+        ):
+            lane = int(crosswalks.crossed_lane[k])
+            guarded = []
+            if lanes.length_m[lane] - crosswalks.crossed_end_m[k] <= STOP_LINE_M:
+                guarded.append(lane)
+            if (
+                lanes.junction[lane] >= 0
+                and crosswalks.crossed_begin_m[k] <= 0.5 * lanes.length_m[lane]
+            ):
+                guarded += _linked(lanes.predecessor_start, lanes.predecessor, lane)
+            lines = [int(lanes.stop_line[lane]) for lane in guarded if lanes.stop_line[lane] >= 0]
+            heads = [int(signals.stop_signal[line]) for line in lines]
+            found |= {head for head in heads if signals.kind[head] == SignalKind.LIGHT}
+        lights += sorted(found)
+        starts.append(len(lights))
+    return {"light_start": np.array(starts, np.int32), "light": np.array(lights, np.int32)}
+
+
+def _linked(start: NDArray[np.int32], links: NDArray[np.int32], lane: int) -> list[int]:
+    return [int(other) for other in links[start[lane] : start[lane + 1]]]
+
+
+def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> dict[str, Any]:
+    """For each lane the crosswalks ahead, found by walking back from them."""
+    rows: list[list[tuple[int, int, float, float]]] = [[] for _ in range(lanes.kind.size)]
+    for crosswalk in range(crosswalks.width_m.size):
+        for k in range(
+            crosswalks.crossed_start[crosswalk], crosswalks.crossed_start[crosswalk + 1]
+        ):
+            crossed = int(crosswalks.crossed_lane[k])
+            depth = float(crosswalks.crossed_end_m[k] - crosswalks.crossed_begin_m[k])
+            begin = {crossed: float(crosswalks.crossed_begin_m[k])}
+            front = [crossed]
+            while front:
+                lane = front.pop(0)
+                rows[lane].append((crosswalk, crossed, begin[lane], begin[lane] + depth))
+                for before in _linked(lanes.predecessor_start, lanes.predecessor, lane):
+                    if begin[lane] < REACH_M and before not in begin:
+                        begin[before] = begin[lane] + float(lanes.length_m[before])
+                        front.append(before)
+    flat = [row for own in rows for row in own]
+    return {
+        "approach_start": np.cumsum([0, *(len(own) for own in rows)]).astype(np.int32),
+        "approach": np.array([row[0] for row in flat], np.int32),
+        "approach_lane": np.array([row[1] for row in flat], np.int32),
+        "approach_begin_m": np.array([row[2] for row in flat], np.float64),
+        "approach_end_m": np.array([row[3] for row in flat], np.float64),
+    }

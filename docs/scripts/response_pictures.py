@@ -1,0 +1,86 @@
+"""Draws the pictures of docs/explaining.md from a run: situations, three drives, heads.
+
+python docs/scripts/response_pictures.py results/small --routes 24 9 17
+
+All drives of the run are looked at every half second, the chosen ones every 0.2 s; what was
+measured before is read from the run's folder.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from matplotlib.figure import Figure
+from PIL import Image
+
+from leaderboard.pages.response_figures import (
+    gradient_figure,
+    head_figure,
+    situation_figure,
+)
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.results import read_run
+from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.measuring import measured
+from leaderboard.responding.moments import marked_moments
+from leaderboard.running.displays.work_bar import work_bar
+
+IMAGES = Path(__file__).resolve().parents[1] / "images"
+COLOURS = 48  # a palette: a third of the size
+EVERY_S, CLOSER_S = 0.5, 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pictures:
+    """What to draw."""
+
+    run: Annotated[Path, tyro.conf.Positional]
+    """The run's folder."""
+
+    routes: tuple[str, str, str]
+    """Three routes; the heads are of the first."""
+
+
+def save(figure: Figure, name: str) -> None:
+    """Writes a small PNG."""
+    path = IMAGES / f"responses-{name}.png"
+    figure.savefig(path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+    print(path)
+
+
+def looked_at(
+    run: RunRecord, records: list[RouteRecord], folder: Path, every_s: float
+) -> list[DriveResponses]:
+    """Responses of these drives."""
+    with work_bar("looking", "drives") as bar:
+        task = bar.add_task("", total=len(records))
+        found = []
+        for drive in measured(run, records, folder, every_s=every_s):
+            found.append(drive)
+            bar.advance(task)
+    return found
+
+
+def main(pictures: Pictures) -> None:
+    """Measures what was not measured yet, and draws."""
+    run = read_run(pictures.run)
+    driven = [record for record in run.scored if record.steps]
+    save(
+        situation_figure(looked_at(run, driven, pictures.run / "responses", EVERY_S)), "situations"
+    )
+    first = {record.route_id: record for record in reversed(driven)}  # of its first seed
+    chosen = [first[route] for route in pictures.routes]
+    drives = looked_at(run, chosen, pictures.run / "responses-closer", CLOSER_S)
+    for drive in drives:
+        save(gradient_figure(drive, marked_moments(drive)), f"route-{drive.route_id}")
+    save(head_figure(drives[0], marked_moments(drives[0])), "heads")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Pictures, description=__doc__))

@@ -1,0 +1,1 @@
+"""A route explained: looks into its policy, questions of what if, and their answers."""

@@ -1,0 +1,1 @@
+"""CARLA's `results.json`, in the layouts of its Leaderboards."""

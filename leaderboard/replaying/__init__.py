@@ -1,0 +1,1 @@
+"""Recorded drives driven again: replayed, retraced with their agent, branched, verified."""

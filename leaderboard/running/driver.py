@@ -1,0 +1,90 @@
+"""An environment and a way to make the agent, ready to drive one job after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Any
+
+from agents import load_agent
+from agents.base import Agent, Requirements
+from di_envs.route_env import RouteEnv
+from leaderboard.records.record import RouteRecord
+from leaderboard.running.episode import close_agent, drive_route
+from leaderboard.running.interventions import sort_interventions
+from leaderboard.running.jobs import Job, RunSpec
+from leaderboard.running.timed_agent import TimedAgent
+from leaderboard.running.wall_clock import Doing, Stopwatch
+from leaderboard.scoring.rules import rules_named
+
+
+class Driver:
+    """Drives jobs of one run. The environment is kept; the agent is made anew for each route,
+    as in CARLA, so that one that hides its memory cannot carry it from route to route."""
+
+    def __init__(
+        self,
+        spec: RunSpec,
+        requires: Requirements | None = None,
+        watch: Stopwatch | None = None,
+    ) -> None:
+        self.spec, self._watch = spec, watch or Stopwatch()
+        self._rules = rules_named(spec.rules)
+        self.requires = requires or agent_requirements(spec.agent)
+        self.env = RouteEnv(**environment_options(spec.options, self.requires))
+        self.interventions = sort_interventions(spec.interventions, self.env.observation_space)
+        self._shown = self.interventions.around(self.env)
+
+    def drive(self, job: Job, moved: Callable[[], None] = lambda: None) -> RouteRecord:
+        """Drives one route; never raises for what the agent does.
+
+        Args:
+            job: The route and the seed.
+            moved: Called once the first decision was carried out.
+        """
+        self._watch.begin_job()
+        self._watch.mark(Doing.SIMULATING)
+        try:
+            return drive_route(
+                self._shown,
+                lambda: TimedAgent(self._new_agent, self._watch, moved),
+                job,
+                self._rules,
+                requires=self.requires,
+                interventions=self.spec.interventions,
+            )
+        finally:
+            self._watch.end_job()
+
+    def _new_agent(self) -> Agent[Any]:
+        return self.interventions.agent(self.spec.agent)
+
+    def __enter__(self) -> Driver:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.env.close()
+
+
+def agent_requirements(spec: str) -> Requirements:
+    """What the agent of that spec requires; raises whatever making it raises."""
+    agent = load_agent(spec)
+    try:
+        return agent.requires
+    finally:
+        close_agent(agent)
+
+
+def environment_options(options: Mapping[str, Any], requires: Requirements) -> dict[str, Any]:
+    """Environment options of a run: what the agent requires, and over it what the user says."""
+    return {
+        **requires.options,
+        "observations": requires.observations,
+        "control_dt_s": requires.control_dt_s,
+        **options,
+    }

@@ -1,0 +1,71 @@
+"""Sets a run up: its driver, and what is learnt from it before anything is driven."""
+
+from __future__ import annotations
+
+import hashlib
+
+from agents import AgentSpecError
+from agents.base import Requirements
+from di_envs.numerics.kernels import cpu_capability
+from leaderboard.records.versions import agent_hash, package_versions
+from leaderboard.running.driver import Driver, agent_requirements
+from leaderboard.running.episode import describe
+from leaderboard.running.interventions import check_interventions
+from leaderboard.running.jobs import Job, RunSpec, SetupError
+from leaderboard.running.log import route_hash
+from leaderboard.running.messages import Scene
+from leaderboard.running.wall_clock import Doing, Stopwatch
+
+
+def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None) -> Driver:
+    """The run's driver.
+
+    Args:
+        spec: The run.
+        watch: Where the driver marks what it is doing.
+        requires: What the agent requires, if that is known; else one is made and asked.
+
+    Raises:
+        SetupError: If the agent cannot be made, or the environment refuses its options.
+    """
+    watch.mark(Doing.SETTING_UP)
+    first_time = requires is None
+    requires = requires or _requirements(spec.agent)
+    watch.mark(Doing.LOADING)
+    try:
+        driver = Driver(spec, requires, watch)
+        first = Job(index=0, route_id=driver.env.route_ids[0], seed=0)
+        driver.env.reset(seed=first.world_seed, options={"route": first.route_id})
+        if first_time:
+            space = driver.env.observation_space
+            check_interventions(driver.interventions, spec.agent, space, requires)
+    except (ValueError, OSError, ImportError) as error:
+        raise SetupError(str(error)) from error
+    return driver
+
+
+def _requirements(agent: str) -> Requirements:
+    try:
+        return agent_requirements(agent)
+    except AgentSpecError as error:
+        raise SetupError(str(error)) from error
+    except (Exception, SystemExit) as error:
+        raise SetupError(f"agent '{agent}' cannot be made: {describe(error)}") from error
+
+
+def scene_of(driver: Driver) -> Scene:
+    """What there is to drive, and with what."""
+    town = driver.env.view.town
+    routes = hashlib.blake2b(digest_size=16)
+    for plan in driver.env.plans:
+        routes.update(f"{plan.route_id}\0{route_hash(plan)}\0".encode())
+    return Scene(
+        requires=driver.requires,
+        agent_hash=agent_hash(driver.spec.agent),
+        town=town.name,
+        town_hash=town.content_hash,
+        route_ids=tuple(driver.env.route_ids),
+        routes_hash=routes.hexdigest(),
+        versions=package_versions(),
+        cpu=cpu_capability(),
+    )

@@ -1,0 +1,153 @@
+"""Collects drives on a Ray cluster: driven wherever there is room, written here.
+
+The machines need no folder in common: a drive comes back as the bytes of its file. These are the
+same on equal footing only, so a machine whose CPU or versions are not those of this one is refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import tempfile
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from agents.training.collect import DriveJob, Outcome, Pending, Pool
+from agents.training.frames import write_whole
+from di_envs.numerics.kernels import cpu_capability
+from leaderboard.records.versions import package_versions
+from leaderboard.running.jobs import SetupError
+from leaderboard.running.workers.ray_engine import cluster
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footing:
+    """What the bits of a drive depend on beside its town and number."""
+
+    cpu: str
+    versions: Mapping[str, str]
+
+    @classmethod
+    def here(cls) -> Footing:
+        """This machine's."""
+        return cls(cpu=cpu_capability(), versions=package_versions())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """What comes back from the cluster: what became of a drive, its file, and where it ran."""
+
+    outcome: Outcome
+    content: bytes
+    footing: Footing
+
+
+def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Driven:
+    """Drives on whatever machine this runs on, and leaves nothing there."""
+    with tempfile.TemporaryDirectory(prefix="driveinsight-") as folder:
+        there = dataclasses.replace(job, folder=Path(folder))
+        outcome = drive(there)
+        path = there.dropped_path if outcome.why else there.path
+        return Driven(
+            outcome=dataclasses.replace(outcome, job=job),
+            content=path.read_bytes(),
+            footing=Footing.here(),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RayPending:
+    """A drive that the cluster was asked for; nothing is written before its `result`."""
+
+    ray: Any
+    reference: Any
+
+    def result(self) -> Outcome:
+        """Waits for the drive, and writes its file.
+
+        Raises:
+            SetupError: If it was driven on a machine that gives other bits, or not at all.
+        """
+        try:
+            driven: Driven = self.ray.get(self.reference)
+        except self.ray.exceptions.RayError as error:
+            raise SetupError(f"the cluster did not drive it: {error}") from error
+        check_footing(driven.footing)
+        job = driven.outcome.job
+        path = job.dropped_path if driven.outcome.why else job.path
+        write_whole(path, lambda file: file.write(driven.content))
+        return driven.outcome
+
+    def cancel(self) -> bool:
+        """Leaves it, even while it is being driven: there will be no file."""
+        self.ray.cancel(self.reference, force=True)
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """A drive whose file is here already."""
+
+    outcome: Outcome
+
+    def result(self) -> Outcome:
+        """What it holds."""
+        return self.outcome
+
+    def cancel(self) -> bool:
+        """There is nothing to leave."""
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class RayPool:
+    """A cluster that drives; see `agents.training.collect.Pool`."""
+
+    ray: Any
+
+    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending:
+        """Has a job driven, unless its file is here."""
+        if job.done:
+            return Found(outcome=drive(job))
+        elsewhere = self.ray.remote(num_cpus=1)(drive_elsewhere)
+        return RayPending(ray=self.ray, reference=elsewhere.remote(drive, job))
+
+
+@contextlib.contextmanager
+def ray_pool(workers: int, address: str | None) -> Generator[Pool]:
+    """A cluster for as long as this lasts.
+
+    Args:
+        workers: Drives at the same time, where the cluster is of this machine alone.
+        address: Of a running cluster; None starts one on this machine, and ends it.
+
+    Raises:
+        SetupError: If there is no Ray, or no such cluster.
+    """
+    with cluster(workers, address) as ray:
+        yield RayPool(ray=ray)
+
+
+def check_footing(footing: Footing) -> None:
+    """Refuses a machine that would give other bits than this one.
+
+    Raises:
+        SetupError: If its CPU or its versions are others.
+    """
+    ours = Footing.here()
+    if footing.cpu != ours.cpu:
+        raise SetupError(
+            f"a machine of the cluster has another CPU ({footing.cpu}, here {ours.cpu}), so its "
+            f"drives would have other bits: collect with machines that are alike"
+        )
+    other = [
+        f"{name} {footing.versions.get(name, 'missing')} (here {version})"
+        for name, version in ours.versions.items()
+        if footing.versions.get(name) != version
+    ]
+    if other:
+        raise SetupError(
+            f"a machine of the cluster has other versions: {', '.join(other)}: install the same"
+        )

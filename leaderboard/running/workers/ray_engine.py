@@ -1,0 +1,276 @@
+"""Drives on a Ray cluster: the same workers, each held by an actor on whichever machine has room.
+
+An actor does for its worker what `WorkerProcess` does here: it hands over jobs, watches the clock
+and kills. Bits are equal on equal footing only, so a machine whose CPU or versions are not those of
+the first worker is refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import signal
+import sys
+from collections import deque
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any
+
+from agents.base import Requirements
+from leaderboard.records.record import WORKER_DIED
+from leaderboard.running.jobs import Job, RunSpec, SetupError
+from leaderboard.running.messages import (
+    Died,
+    Driven,
+    EngineEvent,
+    Lost,
+    Pause,
+    Ready,
+    Refused,
+    Scene,
+    Started,
+    Warned,
+    WorkerMessage,
+)
+from leaderboard.running.wall_clock import Limits
+from leaderboard.running.workers.local_engine import PAUSE_S
+from leaderboard.running.workers.worker_process import WorkerProcess
+
+_MOST_NEVER_READY = 5  # workers that die as they start: a cluster's fault that will not go away
+WITHOUT_RAY = "--engine ray needs Ray: pip install 'driveinsight[ray]'"
+
+
+class RayWorker:
+    """An actor: one worker process on the actor's machine."""
+
+    def __init__(self, spec: RunSpec, limits: Limits, requires: Requirements | None) -> None:
+        self._worker = WorkerProcess(spec, limits)
+        self._worker.begin(requires)
+
+    def set_up(self) -> list[WorkerMessage]:
+        """Waits for the worker to be ready; what it told, the last that it is or cannot be."""
+        return self._listen(Ready, Refused, Died)
+
+    def drive(self, job: Job) -> list[WorkerMessage]:
+        """Has a job driven; what the worker told, the last what became of the job."""
+        self._worker.hand_over(job)
+        return self._listen(Driven, Died)
+
+    def _listen(self, *last: type) -> list[WorkerMessage]:
+        told: list[WorkerMessage] = []
+        while not (told and isinstance(told[-1], last)):
+            wait([self._worker.connection, self._worker.sentinel], timeout=PAUSE_S)
+            told += [m for m in self._worker.receive() if isinstance(m, (*last, Warned))]
+        return told
+
+
+@dataclass(kw_only=True, eq=False)
+class _Held:
+    """An actor as the driver holds it: what it was asked last, and its job."""
+
+    actor: Any
+    asked: Any
+    job: Job | None = None
+    ready: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RayEngine:
+    """Jobs shared out among `workers` actors.
+
+    Attributes:
+        address: Of a running cluster, such as `auto` or `ray://head:10001`; None starts one on
+            this machine, and ends it.
+    """
+
+    workers: int = 1
+    limits: Limits = field(default_factory=Limits)
+    address: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers < 1:
+            raise ValueError(f"an engine needs at least 1 worker, not {self.workers}")
+
+    def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
+        """See `engines.Engine.run`."""
+        with cluster(self.workers, self.address) as ray:
+            crew = _Crew(self, ray, _absolute(spec), jobs)
+            with contextlib.closing(crew):
+                while not crew.done:
+                    yield from crew.share_out()
+                    yield from crew.listen()
+
+
+class _Crew:
+    """The actors of one run. The first finds out what there is to drive."""
+
+    def __init__(self, engine: RayEngine, ray: Any, spec: RunSpec, jobs: deque[Job]) -> None:
+        self._engine, self._ray, self._spec, self._jobs = engine, ray, spec, jobs
+        self._scene: Scene | None = None
+        self._actor_class = ray.remote(num_cpus=1, max_restarts=0)(RayWorker)
+        self._crew = [self._hire()]
+        self._never_ready = 0
+
+    def _hire(self) -> _Held:
+        requires = self._scene.requires if self._scene else None
+        actor = self._actor_class.remote(self._spec, self._engine.limits, requires)
+        return _Held(actor=actor, asked=actor.set_up.remote())
+
+    @property
+    def done(self) -> bool:
+        """Whether all is driven."""
+        idle = all(held.job is None for held in self._crew)
+        return self._scene is not None and idle and not self._jobs
+
+    def share_out(self) -> Generator[EngineEvent]:
+        """Hires as many actors as there is work for; gives jobs to those that are ready."""
+        if self._scene is None:
+            return
+        busy = sum(held.job is not None for held in self._crew)
+        while len(self._crew) < min(self._engine.workers, busy + len(self._jobs)):
+            self._crew.append(self._hire())
+        for held in self._crew:
+            if held.ready and held.job is None and self._jobs:
+                held.job = self._jobs.popleft()
+                held.asked = held.actor.drive.remote(held.job)
+                yield Started(job=held.job)
+
+    def listen(self) -> Generator[EngineEvent]:
+        """Tells what actors answered, or that there was nothing for a while."""
+        asked = {held.asked: held for held in self._crew if held.asked is not None}
+        answered, _ = self._ray.wait(list(asked), num_returns=1, timeout=PAUSE_S)
+        if not answered:
+            yield Pause()
+        for reference in answered:
+            held = asked[reference]
+            held.asked = None
+            for message in self._answer(reference):
+                yield from self._take(held, message)
+
+    def _answer(self, reference: Any) -> list[WorkerMessage]:
+        """What an actor told; of one whose process or machine is gone, that it is."""
+        try:
+            told: list[WorkerMessage] = self._ray.get(reference)
+        except self._ray.exceptions.RayError as error:
+            return [Died(status=WORKER_DIED, reason=f"the Ray worker is gone: {_brief(error)}")]
+        return told
+
+    def _take(self, held: _Held, message: WorkerMessage) -> Generator[EngineEvent]:
+        match message:
+            case Ready(scene=scene):
+                held.ready = True
+                if self._scene is None:
+                    self._scene = scene
+                    yield message
+                check_footing(self._scene, scene)
+            case Refused(reason=reason):
+                raise SetupError(reason)
+            case Died(status=status, reason=reason):
+                yield from self._dismiss(held, status, reason)
+            case Driven():
+                held.job = None
+                yield message
+            case Warned():
+                yield message
+
+    def _dismiss(self, held: _Held, status: str, reason: str) -> Generator[EngineEvent]:
+        """Lets a dead actor go; another takes its place, unless too many never got ready."""
+        self._crew.remove(held)
+        self._ray.kill(held.actor)
+        self._never_ready += not held.ready
+        if self._scene is None or self._never_ready > _MOST_NEVER_READY:
+            raise SetupError(f"a Ray worker cannot be set up: {reason}")
+        if held.job is not None:
+            yield Lost(job=held.job, status=status, reason=reason)
+
+    def close(self) -> None:
+        """Ends all actors, and with them their workers."""
+        for held in self._crew:
+            self._ray.kill(held.actor)
+
+
+def check_footing(first: Scene, other: Scene) -> None:
+    """Refuses a machine that would give other bits.
+
+    Raises:
+        SetupError: If its CPU, versions, map, routes or agent are not those of the first worker.
+    """
+    for name in ("cpu", "versions", "town_hash", "routes_hash", "agent_hash"):
+        ours, theirs = getattr(first, name), getattr(other, name)
+        if ours != theirs:
+            raise SetupError(
+                f"machines of the cluster differ in {name} ({_text(ours)} and {_text(theirs)}), "
+                "so the same route would not give the same bits: use machines that are alike, "
+                "with the same packages and files"
+            )
+
+
+def _brief(error: Exception) -> str:
+    """The line of Ray's report that says what happened: an exception's last, else the first."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if "Error: " in lines[-1] else lines[0]
+
+
+def _text(value: Any) -> str:
+    return ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else value
+
+
+def _absolute(spec: RunSpec) -> RunSpec:
+    """The run with paths that are good in another working folder."""
+    options = {
+        name: str(Path(value).resolve()) if _is_path(value) else value
+        for name, value in spec.options.items()
+    }
+    agent = ":".join(str(Path(p).resolve()) if _is_path(p) else p for p in spec.agent.split(":"))
+    return dataclasses.replace(spec, agent=agent, options=options)
+
+
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | Path) and "." in str(value) and Path(value).exists()
+
+
+def _own_cluster(workers: int) -> dict[str, Any]:
+    """Options of a cluster of this machine, which finds the modules that are found here."""
+    modules = os.pathsep.join(str(Path(place).resolve()) for place in sys.path)
+    return {
+        "num_cpus": workers,
+        "include_dashboard": False,
+        "runtime_env": {"env_vars": {"PYTHONPATH": modules}},
+    }
+
+
+@contextlib.contextmanager
+def cluster(workers: int, address: str | None) -> Generator[Any]:
+    """Ray, connected for as long as this lasts; see `RayEngine` for what it is told.
+
+    Within another, it is that one's connection.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray asks nothing else, as it loads
+    try:
+        import ray
+    except ImportError as error:
+        raise SetupError(WITHOUT_RAY) from error
+    if ray.is_initialized():
+        yield ray
+        return
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    local = {} if address else _own_cluster(workers)
+    try:
+        ray.init(
+            address=address or "local",
+            log_to_driver=False,
+            logging_level="error",
+            **local,
+        )
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        raise SetupError(f"there is no Ray cluster at '{address}': {error}") from error
+    try:
+        with contextlib.suppress(ValueError):  # only the main thread has handlers
+            for number, handler in handlers.items():
+                signal.signal(number, handler)  # Ray has put its own in their place
+        yield ray
+    finally:
+        ray.shutdown()

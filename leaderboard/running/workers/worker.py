@@ -1,0 +1,105 @@
+"""What a worker process does: set the run up, then drive one job after another till told to end.
+
+It ignores Ctrl-C, tells its parent all that happens in `messages`, and ends when its parent does.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import signal
+import threading
+import warnings
+from collections.abc import Callable
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from leaderboard.running.jobs import Job, RunSpec, SetupError
+from leaderboard.running.wall_clock import Doing, Stopwatch
+
+WHERE_SIGNAL = signal.SIGUSR1  # asks a worker to write down where it is
+
+
+def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> None:
+    """A worker's life.
+
+    Args:
+        connection: To the parent, which first sends what the agent requires (None for the worker
+            that is to find that out), then jobs.
+        cells: Of its `Stopwatch`.
+        spec: The run.
+        where: File into which it writes where it is when it gets `WHERE_SIGNAL`.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.enable()  # a crash inside a library says on stderr which line led to it
+    with open(where, "w", encoding="utf-8") as place:
+        where.unlink()  # the parent has it open: nothing is left behind, whatever happens
+        faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
+        _end_with_parent()
+        watch = Stopwatch(cells)
+        try:
+            _work(connection, watch, spec)
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            pass  # the parent wants no more
+        finally:
+            faulthandler.unregister(WHERE_SIGNAL)
+
+
+def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:
+    tell = _teller(connection)
+    watch.mark(Doing.LOADING)
+
+    from leaderboard.running.compiling import compile_events
+    from leaderboard.running.messages import Compiling, Driven, Ready, Refused, Warned
+    from leaderboard.running.setting_up import scene_of, set_up
+
+    def compiling(event: Compiling) -> None:
+        watch.lap()  # each kernel has the whole time
+        tell(event)
+
+    def moved() -> None:
+        tell(Compiling())  # the first step has run them all
+
+    watch.mark(Doing.WAITING)
+    requires = connection.recv()
+    with compile_events(compiling), warnings.catch_warnings():
+        warnings.simplefilter("default", UserWarning)
+        warnings.showwarning = lambda message, *_, **__: tell(Warned(text=str(message)))
+        try:
+            driver = set_up(spec, watch, requires)
+        except SetupError as error:
+            tell(Refused(reason=str(error)))
+            return
+        tell(Ready(scene=scene_of(driver)))
+        with driver:
+            while True:
+                watch.mark(Doing.WAITING)
+                job: Job = connection.recv()
+                tell(Driven(job=job, record=driver.drive(job, moved)))
+
+
+def _teller(connection: Connection) -> Callable[[Any], None]:
+    """Sends messages from any thread, each whole."""
+    lock = threading.Lock()
+
+    def tell(message: Any) -> None:
+        with lock:
+            connection.send(message)
+
+    return tell
+
+
+def _end_with_parent() -> None:
+    """A parent that is killed cannot stop its workers: they watch it, and end too."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    sentinel = parent.sentinel
+
+    def watch_parent() -> None:
+        wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch_parent, daemon=True).start()

@@ -1,0 +1,36 @@
+"""What people call events and scenarios: one name each, in every table, map and picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from di_envs.world.kinds import EventKind
+
+EVENT_NAMES: Mapping[EventKind, str] = MappingProxyType(
+    {
+        EventKind.COLLISION_WALKER: "walker hit",
+        EventKind.COLLISION_VEHICLE: "vehicle hit",
+        EventKind.COLLISION_STATIC: "object hit",
+        EventKind.RED_LIGHT: "red light",
+        EventKind.STOP_SIGN: "stop sign",
+        EventKind.OUTSIDE_LANES: "outside lanes",
+        EventKind.ROUTE_DEVIATION: "off route",
+        EventKind.TIMEOUT: "timeout",
+        EventKind.BLOCKED: "blocked",
+        EventKind.MIN_SPEED: "too slow",
+    }
+)
+
+# By the Leaderboard's number
+SCENARIO_NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "1": "debris, and control is lost for a moment",
+        "3": "somebody steps out from behind an obstacle",
+        "4": "somebody crosses after a turn",
+        "7": "crossing traffic gets green too",
+        "8": "unprotected left turn",
+        "9": "right turn into crossing traffic",
+        "10": "crossing without lights",
+    }
+)

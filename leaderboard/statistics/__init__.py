@@ -1,0 +1,1 @@
+"""How surely a number is known: intervals over seeds and over routes."""

@@ -1,0 +1,173 @@
+"""A comparison of two runs, or of two rule sets, as terminal tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.console import Group
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
+from leaderboard.scoring.names import EVENT_NAMES
+from leaderboard.statistics.bootstrap import DifferenceInterval
+from leaderboard.studies.comparing import SCORES, Comparison, Pair
+
+_NAMES = {"driving_score": "DS", "route_completion": "RC", "infraction_score": "IS"}
+_DECIMALS = {"driving_score": 2, "route_completion": 2, "infraction_score": 3}
+FEW_ROUTES = 10  # fewer distinct ones make a bootstrap interval too narrow
+
+
+def comparison_tables(comparison: Comparison) -> Group:
+    """Mean differences with their intervals, then the routes that changed and why."""
+    changes = comparison.changes()
+    parts: list[Table | Text] = [_score_table(comparison)]
+    if changes:
+        parts.append(_change_table(changes))
+    return Group(*parts, Text(_caption(comparison, len(changes)), style="dim"))
+
+
+def _score_table(comparison: Comparison) -> Table:
+    before, after = comparison.before, comparison.after
+    table = Table(
+        title=f"{escape(before.title)} and {escape(after.title)} on {escape(before.suite)}"
+        f" · rules {before.rules}",
+        title_justify="left",
+        title_style="bold",
+    )
+    table.add_column("")
+    for name in ("first", "second", "difference", "95 % interval"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for score in SCORES:
+        ours = [getattr(pair.before.score, score) for pair in comparison.pairs]
+        theirs = [getattr(pair.after.score, score) for pair in comparison.pairs]
+        digits, interval = _DECIMALS[score], comparison.interval(score)
+        table.add_row(
+            _NAMES[score],
+            f"{math.fsum(ours) / len(ours):.{digits}f}",
+            f"{math.fsum(theirs) / len(theirs):.{digits}f}",
+            f"{interval.mean + 0.0:+.{digits}f}",
+            _interval_text(interval, digits),
+            style="bold" if interval.clear else None,
+        )
+    return table
+
+
+def _interval_text(interval: DifferenceInterval, digits: int) -> str:
+    if interval.low is None or interval.high is None:
+        return "-"
+    return f"{interval.low + 0.0:+.{digits}f} … {interval.high + 0.0:+.{digits}f}"
+
+
+def _change_table(changes: Sequence[Pair]) -> Table:
+    table = Table(
+        title="what changed: DS of routes, and the events that are gone or new",
+        title_justify="left",
+        title_style="bold",
+    )
+    table.add_column("route")
+    for name in ("seed", "first", "second", "change"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("by", overflow="fold")
+    for pair in changes:
+        table.add_row(
+            escape(pair.before.route_id),
+            str(pair.before.seed),
+            f"{pair.before.score.driving_score:.1f}",
+            f"{pair.after.score.driving_score:.1f}",
+            f"{pair.difference:+.1f}",
+            escape(_reasons(pair)),
+        )
+    return table
+
+
+def _reasons(pair: Pair) -> str:
+    """`no longer: red light (12.3 s); new: vehicle hit (40.0 s)`, or how far it came."""
+    parts = []
+    if pair.gone:
+        parts.append(f"no longer: {', '.join(map(_event_text, pair.gone))}")
+    if pair.new:
+        parts.append(f"new: {', '.join(map(_event_text, pair.new))}")
+    if pair.before.crashed != pair.after.crashed:
+        parts.append(f"{_plain(pair.before.status)}, then {_plain(pair.after.status)}")
+    if not parts:
+        before, after = pair.before.score, pair.after.score
+        if before.route_completion != after.route_completion:
+            parts.append(
+                f"route completion {before.route_completion:.1f}, then {after.route_completion:.1f}"
+            )
+        else:
+            parts.append("the same events, of another size")
+    return "; ".join(parts)
+
+
+def _event_text(event: EventRecord) -> str:
+    name = EVENT_NAMES.get(event.kind, event.kind.name.lower().replace("_", " "))
+    return f"{name} ({event.time_s:.1f} s)"
+
+
+def _plain(status: str) -> str:
+    return status.removeprefix("Failed - ")
+
+
+def _caption(comparison: Comparison, changed: int) -> str:
+    pairs, routes = len(comparison.pairs), comparison.routes
+    same = sum(pair.same_episode for pair in comparison.pairs)
+    lines = [
+        f"{pairs} pairs of route and seed over {routes} distinct routes; {changed} changed, "
+        f"{same} are the same episode to the bit.",
+        "Differences are second less first; intervals: bootstrap over distinct routes.",
+    ]
+    if routes == 1:
+        lines.append("One route: nothing can be said of others.")
+    elif routes < FEW_ROUTES:
+        lines.append(f"With {routes} routes the intervals are likely too narrow.")
+    if comparison.lost:
+        lines.append(f"Left out: {comparison.lost} that the machinery lost in a run.")
+    if comparison.unpaired:
+        lines.append(f"Left out: {comparison.unpaired} that only one run has.")
+    return "\n".join(lines)
+
+
+def rescoring_table(run: RunRecord, other: RunRecord) -> Table:
+    """The routes of one run under two rule sets, side by side, and their means."""
+    table = Table(
+        title=f"{escape(run.agent)} on {escape(run.suite)} · {run.rules} and {other.rules}",
+        title_justify="left",
+        title_style="bold",
+    )
+    table.add_column("route")
+    table.add_column("seed", justify="right")
+    for rules in (run.rules, other.rules):
+        for name in ("DS", "RC", "IS"):
+            table.add_column(f"{name}\n{rules.removeprefix('carla-')}", justify="right")
+    table.add_column("change of DS", justify="right")
+    pairs = list(zip(run.scored, other.scored, strict=True))
+    for ours, theirs in pairs:
+        change = theirs.score.driving_score - ours.score.driving_score
+        table.add_row(
+            escape(ours.route_id),
+            str(ours.seed),
+            *_score_cells([ours]),
+            *_score_cells([theirs]),
+            f"{change:+.1f}" if change else "",
+        )
+    table.add_section()
+    change = math.fsum(b.score.driving_score - a.score.driving_score for a, b in pairs)
+    table.add_row(
+        "mean",
+        "",
+        *_score_cells(run.scored),
+        *_score_cells(other.scored),
+        f"{change / len(pairs) + 0.0:+.2f}",
+        style="bold",
+    )
+    return table
+
+
+def _score_cells(records: Sequence[RouteRecord]) -> list[str]:
+    count = len(records)
+    means = [math.fsum(getattr(r.score, name) for r in records) / count for name in SCORES]
+    return [f"{means[0]:.1f}", f"{means[1]:.1f}", f"{means[2]:.3f}"]

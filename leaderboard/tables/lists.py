@@ -1,0 +1,87 @@
+"""What there is to evaluate: agents and suites, as tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from rich.markup import escape
+from rich.table import Table
+
+from agents import AGENTS, SCHEMES, AgentSpecError, load_agent
+from di_envs.suites import Suite, load_suite, suite_names
+from di_envs.town.loading import load_town
+from di_envs.town.routing.scenarios import STAGED
+
+
+def agent_table() -> Table:
+    """The agents that have a name, with their track."""
+    table = Table(title="agents", title_justify="left", title_style="bold")
+    for column in ("name", "track", "what it does"):
+        table.add_column(column)
+    for name, entry in AGENTS.items():
+        table.add_row(name, _track(name), escape(entry.summary))
+    return table
+
+
+def scheme_table() -> Table:
+    """The kinds of files that hold a driver from elsewhere, and how each is named."""
+    table = Table(title="from elsewhere", title_justify="left", title_style="bold")
+    for column in ("--agent", "what it is"):
+        table.add_column(column)
+    for entry in SCHEMES.values():
+        spec, _, summary = entry.summary.partition(": ")
+        table.add_row(escape(spec), escape(summary))
+    return table
+
+
+def _track(name: str) -> str:
+    """The agent's track; an agent whose extra packages are missing says which."""
+    try:
+        agent = load_agent(name)
+    except ImportError as error:
+        return f"needs {error.name}"
+    except AgentSpecError:
+        return "needs weights"
+    try:
+        return str(agent.requires.track)
+    finally:
+        agent.close()
+
+
+def suite_table() -> Table:
+    """The shipped suites, with how many routes they hold and who else is on the road."""
+    table = Table(title="suites", title_justify="left", title_style="bold")
+    for column in ("name", "version", "town", "routes", "vehicles", "walkers", "what it is"):
+        table.add_column(column, justify="right" if column in _NUMBERS else "left")
+    for suite in map(load_suite, suite_names()):
+        table.add_row(
+            suite.name,
+            str(suite.version),
+            suite.town,
+            str(len(suite.specs())),
+            str(suite.traffic.vehicles),
+            str(suite.traffic.walkers),
+            escape(suite.description),
+        )
+    return table
+
+
+_NUMBERS = ("version", "routes", "vehicles", "walkers")
+
+
+def scenario_table() -> Table:
+    """How many scenarios of each type the routes of the shipped suites meet."""
+    table = Table(title="scenarios along the routes", title_justify="left", title_style="bold")
+    table.add_column("suite")
+    for number in STAGED:
+        table.add_column(f"S{number}", justify="right")
+    for suite in map(load_suite, suite_names()):
+        if suite.scenarios is not None:
+            counts = _scenarios_met(suite)
+            table.add_row(suite.name, *(str(counts[number]) for number in STAGED))
+    return table
+
+
+def _scenarios_met(suite: Suite) -> Counter[int]:
+    plans = suite.plans(load_town(suite.town_path, suite.signals))
+    return Counter(trigger.type for plan in plans for trigger in plan.scenarios)

@@ -1,0 +1,255 @@
+"""Responses by situation, the paper's sentences put to the test, and steady heads: as tables.
+
+The same rows make a terminal's table and Markdown.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from agents.explain.situations import SAYS
+from leaderboard.responding.by_situation import by_situation, moments_of
+from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
+from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.heads import HeadConsistency, head_consistency, verdict_of_heads
+from leaderboard.statistics.resampling import Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """A table before it is a picture.
+
+    Attributes:
+        title: Above it.
+        columns: Heads.
+        rows: Cells.
+        notes: Below it, a line each.
+        words: How many columns from the left hold words, not numbers.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+    words: int = 1
+
+    def rich(self) -> Table:
+        """For a terminal."""
+        table = Table(
+            title=escape(self.title),
+            title_justify="left",
+            title_style="bold",
+            caption=escape("\n".join(self.notes)),
+            caption_justify="left",
+        )
+        for place, name in enumerate(self.columns):
+            table.add_column(escape(name), justify="left" if place < self.words else "right")
+        for row in self.rows:
+            table.add_row(*map(escape, row))
+        return table
+
+    def markdown(self) -> str:
+        """For a document."""
+        places = [":--" if place < self.words else "--:" for place in range(len(self.columns))]
+        lines = [f"### {self.title}", "", _line(self.columns), _line(places)]
+        lines += [_line(row) for row in self.rows]
+        return "\n".join([*lines, "", *(f"{note}  " for note in self.notes)]).rstrip() + "\n"
+
+
+def tables_of(drives: Sequence[DriveResponses]) -> list[Rows]:
+    """All there is to say of drives of one policy; one drive tests nothing."""
+    heads = head_consistency(drives)
+    tables = [situation_rows(drives)]
+    if len(drives) > 1:
+        tables.append(claim_rows(examined(drives)))
+    return [*tables, head_rows(heads)] if heads is not None else tables
+
+
+def write_tables(
+    folder: Path, drives: Sequence[DriveResponses], tables: Sequence[Rows]
+) -> tuple[Path, Path]:
+    """Writes `responses.md` and `responses.json`.
+
+    Raises:
+        OSError: If they cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text, numbers = folder / "responses.md", folder / "responses.json"
+    text.write_text("\n".join(table.markdown() for table in tables), encoding="utf-8")
+    values = as_values(drives, examined(drives), head_consistency(drives))
+    numbers.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return text, numbers
+
+
+def situation_rows(drives: Sequence[DriveResponses]) -> Rows:
+    """The strength of each component's response in each situation."""
+    found, moments = by_situation(drives), moments_of(drives)
+    names = [name for name in drives[0].situations if moments[name]]
+    return Rows(
+        title=f"Mean response by situation: {drives[0].name}",
+        columns=("component", *(f"{_plain(name)}\n{moments[name]} moments" for name in names)),
+        rows=tuple(
+            (_plain(group), *(_give_or_take(cells[name]) for name in names))
+            for group, cells in found.items()
+        ),
+        notes=(
+            "Length of (Gx, Gy), metres of the mean waypoint per unit of token, over "
+            f"{len(drives)} drives of {_routes(drives)} distinct routes; ± half a 95 % interval.",
+            *(f"{_plain(name)}: {SAYS[name]}" for name in names if name in SAYS),
+        ),
+    )
+
+
+def claim_rows(found: Sequence[Finding]) -> Rows:
+    """The paper's sentences, each with its numbers and verdict."""
+    level = 100.0 * (1.0 - (1.0 - LEVEL) / max(len(found), 1))
+    sentences = list(dict.fromkeys((each.claim.sentence, each.claim.source) for each in found))
+    rows = []
+    for each in found:
+        claim = each.claim
+        rows.append(
+            (
+                str(sentences.index((claim.sentence, claim.source)) + 1),
+                f"{_plain(claim.component)} {claim.kind}",
+                _plain(claim.when),
+                str(each.moments),
+                _ratio(each.strength),
+                each.verdict,
+                _ratio(each.share),
+                each.share_verdict,
+            )
+        )
+    return Rows(
+        title="The paper's sentences on responses, put to the test",
+        columns=("", "tested", "when", "moments", "strength", "verdict", "share", "verdict"),
+        rows=tuple(rows),
+        notes=(
+            *(f"{n}: {said} ({where})" for n, (said, where) in enumerate(sentences, start=1)),
+            "rises: in the situation over all other moments; stands out: over the mean component.",
+            f"holds: the whole interval above 1; does not hold: below {SLIGHT:g}. Intervals over "
+            f"routes of {level:.1f} %, {100 * LEVEL:g} % for all of them together.",
+        ),
+        words=3,
+    )
+
+
+def head_rows(found: HeadConsistency) -> Rows:
+    """How steady the heads are, and what each attends to most."""
+    layers, heads = found.heads.shape
+    return Rows(
+        title="Consistency of heads over time, and what each attends to most",
+        columns=("", *(f"head {head}" for head in range(heads))),
+        rows=tuple(
+            (
+                f"layer {layer}",
+                *(
+                    f"{found.heads[layer, head]:.2f} {_plain(found.favourites[layer][head])}"
+                    for head in range(heads)
+                ),
+            )
+            for layer in range(layers)
+        ),
+        notes=(
+            f"All heads: {_mean(found.mean)}. Heads of a layer with each other: "
+            f"{_mean(found.alike)}. Difference: {_mean(found.excess)}.",
+            f"Heads keep preferences of their own (section 4.2.3): {verdict_of_heads(found)}.",
+            "Consistency: mean correlation of a head's shares between moments of a drive. Heads of "
+            "an untrained policy are steady too: compare.",
+        ),
+    )
+
+
+def as_values(
+    drives: Sequence[DriveResponses], claims: Sequence[Finding], heads: HeadConsistency | None
+) -> Mapping[str, object]:
+    """All the numbers, as values that JSON has."""
+    return {
+        "agent": drives[0].agent,
+        "drives": [{"route": d.route_id, "seed": d.seed, "drive": d.drive} for d in drives],
+        "moments": dict(moments_of(drives)),
+        "by_situation": {
+            measure: {
+                group: {name: _values(cell) for name, cell in cells.items()}
+                for group, cells in by_situation(drives, measure).items()
+            }
+            for measure in ("Gx", "Gy", "strength", "share")
+        },
+        "claims": [
+            {
+                "component": each.claim.component,
+                "kind": each.claim.kind,
+                "when": each.claim.when,
+                "sentence": each.claim.sentence,
+                "source": each.claim.source,
+                "moments": each.moments,
+                "strength": {**_values(each.strength), "verdict": each.verdict},
+                "share": {**_values(each.share), "verdict": each.share_verdict},
+            }
+            for each in claims
+        ],
+        "heads": None
+        if heads is None
+        else {
+            "consistency": heads.heads.tolist(),
+            "favourites": [list(layer) for layer in heads.favourites],
+            "mean": _values(heads.mean),
+            "alike": _values(heads.alike),
+            "excess": _values(heads.excess),
+        },
+    }
+
+
+def _values(interval: Interval) -> dict[str, float | int | None]:
+    value = interval.value if math.isfinite(interval.value) else None
+    return {
+        "value": value,
+        "low": interval.low,
+        "high": interval.high,
+        "routes": interval.routes,
+    }
+
+
+def _routes(drives: Sequence[DriveResponses]) -> int:
+    return len({drive.route_hash for drive in drives})
+
+
+def _mean(interval: Interval) -> str:
+    return _with_ends(interval, "{:.3g}")
+
+
+def _give_or_take(interval: Interval) -> str:
+    """`2.74 ±0.26`: half the interval's width."""
+    if not math.isfinite(interval.value):
+        return "-"
+    if interval.low is None or interval.high is None:
+        return f"{interval.value:.3g}"
+    return f"{interval.value:.3g} ±{(interval.high - interval.low) / 2.0:.2g}"
+
+
+def _ratio(interval: Interval) -> str:
+    return _with_ends(interval, "{:.2f}")
+
+
+def _with_ends(interval: Interval, form: str) -> str:
+    """`1.31 (1.20 … 1.42)`; the value alone where there are too few routes for ends."""
+    if not math.isfinite(interval.value):
+        return "-"
+    value = form.format(interval.value)
+    if interval.low is None or interval.high is None:
+        return value
+    return f"{value} ({form.format(interval.low)} … {form.format(interval.high)})"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("\n", ", ") for cell in cells) + " |"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")

@@ -1,0 +1,140 @@
+"""`collect`, `train` and `export`, from nothing to a policy that drives, as a user calls them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import tarfile
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from leaderboard.commands.cli import main
+from leaderboard.commands.ending import EXIT_USAGE
+from leaderboard.records.versions import agent_hash
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("data") / "data"
+    arguments = ["--towns", "small_grid", "--frames", "150", "--output", str(folder)]
+    assert main(["collect", *arguments]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def policy(data, tmp_path_factory):
+    """Trained for three steps: it drives like it."""
+    folder = tmp_path_factory.mktemp("run")
+    arguments = ["--config", "small-prompt-only", "--data", str(data), "--output", str(folder)]
+    arguments += ["--steps", "3", "--batch", "2", "--workers", "0"]
+    assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
+    return folder / "policy"
+
+
+def test_collecting_tells_what_there_is_and_what_is_next(data, capsys):
+    assert main(["collect", "--towns", "small_grid", "--frames", "100", "--output", str(data)]) == 0
+    out = capsys.readouterr().out
+    card = json.loads((data / "card.json").read_text())
+    assert f"{card['drives']} drives with {card['moments']} moments" in out
+    assert "lanefollow" in out
+    assert f"Next: driveinsight train --config small --data {data}" in out
+
+
+def test_training_leaves_a_policy_that_drove_its_log_and_its_card(policy):
+    with (policy.parent / "checks.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["step"] == "3"
+    assert 0.0 <= float(row["driving_score"]) <= 100.0
+    card = (policy / "README.md").read_text()
+    assert '"moments"' in card
+    assert "| step | driving_score |" in card
+
+
+def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, capsys):
+    before = (policy / "weights.safetensors").read_bytes()
+    arguments = ["--config", "small-prompt-only", "--data", str(data)]
+    arguments += ["--output", str(policy.parent), "--steps", "3", "--batch", "2", "--workers", "0"]
+    assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
+    out = capsys.readouterr().out
+    assert "Goes on from step 3" in out
+    assert f"Next: driveinsight evaluate --agent driveinsight:{policy}" in out
+    assert (policy / "weights.safetensors").read_bytes() == before
+
+
+def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_path, capsys):
+    arguments = ["--config", "small-without-cameras", "--data", str(data), "--output"]
+    arguments += [str(tmp_path), "--steps", "1", "--batch", "1", "--workers", "0"]
+    arguments += ["--check-routes", "0", "--init-from", str(policy)]
+    assert main(["train", *arguments]) == 0
+    out = capsys.readouterr().out
+    assert "Taken from" in out
+    assert "prompt (" in out
+    assert "planner (" in out
+
+
+def test_a_policys_hash_changes_with_its_weights(policy, tmp_path):
+    before = agent_hash(f"driveinsight:{policy}")
+    assert before == agent_hash(f"driveinsight:{policy}")
+    (tmp_path / "weights.safetensors").write_bytes(b"other")
+    assert agent_hash(f"driveinsight:{tmp_path}") != before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["train", "--config", "smal"], "did you mean 'small'"),
+        (["train", "--data", "nowhere", "--config", "tiny"], "run `driveinsight collect` first"),
+        (["train", "--init-from", "nowhere"], "give a folder that save_pretrained wrote"),
+        (["train", "--steps", "0"], "steps must be at least 1"),
+        (["train", "--check-every", "0"], "--check-every must be at least 1"),
+        (["collect", "--towns", "suburbs"], "did you mean 'suburb'"),
+        (["collect", "--frames", "0"], "must be at least 1"),
+        (["export", "--data", "nowhere"], "run `driveinsight collect` first"),
+        (["export", "--cameras", "smal"], "did you mean 'small'"),
+        (["evaluate", "--agent", "driveinsight:nowhere", "--suite", "toy"], "save_pretrained"),
+    ],
+)
+def test_a_wrong_request_says_what_to_do(arguments, told, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == EXIT_USAGE
+    assert told in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def shards(data, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("shards")
+    arguments = ["--data", str(data), "--output", str(folder), "--cameras", "rl"]
+    assert main(["export", *arguments, "--drives-per-shard", "1"]) == 0
+    return folder
+
+
+def test_shards_hold_a_samples_files_one_after_the_other(shards, data):
+    path = sorted(shards.iterdir())[0]
+    assert path.name == "driveinsight-000000.tar"
+    with tarfile.open(path) as tar:
+        names = tar.getnames()
+        parts = {
+            name.partition(".")[2]: tar.extractfile(name).read()  # type: ignore[union-attr]
+            for name in names[:5]
+        }
+    key = names[0].partition(".")[0]
+    assert {name.partition(".")[0] for name in names[:5]} == {key}
+    assert list(parts) == ["camera_front.png", "lidar.npy", "prompt.npz", "waypoints.npy", "json"]
+    assert Image.open(io.BytesIO(parts["camera_front.png"])).size == (84, 84)
+    assert np.load(io.BytesIO(parts["lidar.npy"])).shape[1] == 4
+    assert np.load(io.BytesIO(parts["waypoints.npy"])).shape == (8, 2)
+    with np.load(io.BytesIO(parts["prompt.npz"])) as prompt:
+        assert prompt["obstacles"].shape == (32, 9)
+    about = json.loads(parts["json"])
+    assert about["town"] == "small_grid"
+    assert about["waypoints_valid"] == 8
+
+
+def test_a_shard_rendered_again_has_the_same_bytes(shards, data, tmp_path):
+    path = sorted(shards.iterdir())[0]
+    arguments = ["--data", str(data), "--output", str(tmp_path), "--cameras", "rl"]
+    assert main(["export", *arguments, "--drives-per-shard", "1"]) == 0
+    assert (tmp_path / path.name).read_bytes() == path.read_bytes()

@@ -1,0 +1,157 @@
+"""`driveinsight drive`: the drive that evaluate scores, its events, and the video of it."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+from rich.console import Console
+
+from di_envs.sensors.camera.cameras import CameraRig
+from di_envs.suites import load_suite
+from di_envs.world.state import EventKind
+from di_envs.world.world import Event
+from leaderboard.commands.cli import EXIT_USAGE, main
+from leaderboard.running.drive import drive, event_line
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import Job, RunSpec
+from leaderboard.running.video import GIF_WIDTH_PX, VideoError, check_video, open_video
+
+ROUTE = load_suite("toy").specs()[0].route_id
+SPEC = RunSpec(agent="expert", options={"suite": "toy", "traffic": 3, "walkers": 2})
+TOY = ["drive", "--suite", "toy", "--traffic", "3", "--walkers", "2", "--route", ROUTE]
+
+
+@pytest.fixture
+def silent(tmp_path):
+    with open(tmp_path / "console", "w", encoding="utf-8") as file:
+        yield Console(file=file)
+
+
+@pytest.fixture(scope="module")
+def scored():
+    """What `evaluate` makes of the route."""
+    with Driver(SPEC) as driver:
+        return driver.drive(Job(index=0, route_id=ROUTE, seed=2))
+
+
+def test_it_is_the_drive_that_evaluate_scores_whether_it_is_filmed_or_not(scored, silent, tmp_path):
+    watched = drive(SPEC, route_id=ROUTE, seed=2, console=silent)
+    assert watched.fingerprint() == scored.fingerprint()
+    film = tmp_path / "films" / "one.gif"
+    filmed = drive(SPEC, route_id=ROUTE, seed=2, console=silent, video=film)
+    assert filmed.fingerprint() == scored.fingerprint()
+    with Image.open(film) as gif:
+        assert gif.size == (GIF_WIDTH_PX, 320)
+        # a frame for the reset and one a step; frames that are all alike are merged
+        durations = []
+        for frame in range(gif.n_frames):
+            gif.seek(frame)
+            durations.append(gif.info["duration"])
+    assert sum(durations) == 100 * (filmed.steps + 1)
+    assert len(durations) > 0.5 * filmed.steps
+
+
+def test_the_agent_and_the_film_share_one_look_of_one_camera(silent, tmp_path, monkeypatch):
+    """The expert needs no camera: the front one is there for the film, and looks once a step."""
+    looks = []
+    observe = CameraRig.observe
+
+    def counted(rig, only=None):
+        images = observe(rig, only)
+        looks.append(list(images))
+        return images
+
+    monkeypatch.setattr(CameraRig, "observe", counted)
+    film = tmp_path / "one.gif"
+    record = drive(SPEC, route_id=ROUTE, seed=2, console=silent, video=film)
+    resets = 2  # one to compile what the film needs, before the clock runs
+    assert looks == [["camera_front"]] * (record.steps + resets)
+
+
+def test_a_film_has_a_frame_for_the_reset_and_one_for_every_step(tmp_path, capsys):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg to look at the film with")
+    film = tmp_path / "one.mp4"
+    arguments = [*TOY, "--agent", "expert", "--seed", "2", "--no-camera", "--video", str(film)]
+    assert main(arguments) == 0
+    shown = capsys.readouterr()
+    frames, seconds = ffmpeg.count_frames_and_secs(str(film))
+    game_s = float(shown.out.split("took")[1].split()[0])
+    assert frames == round(game_s / 0.1) + 1
+    assert seconds == pytest.approx(game_s + 0.1, abs=0.06)
+    reader = ffmpeg.read_frames(str(film))
+    assert next(reader)["source_size"] == (960, 640)
+    picture = np.frombuffer(next(reader), np.uint8).reshape(640, 960, 3)
+    assert np.abs(picture[320, 320].astype(int) - (255, 90, 54)).max() < 40  # the ego
+    reader.close()
+    assert f"Written: {film}" in shown.out
+
+
+def test_events_are_shown_as_they_happen_and_the_score_at_the_end(capsys):
+    assert main([*TOY, "--agent", "random"]) == 0
+    shown = capsys.readouterr()
+    assert " s  " in shown.err
+    assert " at (" in shown.err
+    assert f"Route {ROUTE}, seed 0: " in shown.out
+    assert "driving score" in shown.out
+
+
+def test_an_event_as_a_line():
+    event = Event(kind=EventKind.OUTSIDE_LANES, ego=0, tick=246, x=10.0, y=-4.52, z=0.0, value=3.0)
+    assert event_line(event) == "   12.3 s  outside lanes, 3.0 m at (10.0, -4.5)"
+
+
+def refused(arguments, capsys):
+    assert main(arguments) == EXIT_USAGE
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["--agent", "exprt"], "did you mean 'expert'?"),
+        (["--agent", "expert", "--video", "film.avi"], ".mp4, .mkv, .mov, .gif; got 'film.avi'"),
+        (["--agent", "expert", "--route", "99"], "Unknown route id"),
+        (["--agent", "expert", "--weather", "ClearNon"], "did you mean 'ClearNoon'?"),
+    ],
+)
+def test_a_wrong_request_is_one_line_with_a_hint(arguments, hint, capsys):
+    assert hint in refused(["drive", "--suite", "toy", *arguments], capsys)
+
+
+def test_without_ffmpeg_the_error_says_what_to_do(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    line = refused([*TOY, "--agent", "expert", "--video", "films/one.mp4"], capsys)
+    assert "there is no ffmpeg to write 'films/one.mp4'" in line
+    assert "driveinsight[video]" in line
+    assert "--video films/one.gif" in line
+
+
+def test_a_gif_needs_no_ffmpeg(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    assert check_video(tmp_path / "one.gif") is None
+
+
+def test_what_ffmpeg_complains_of_is_passed_on(tmp_path):
+    program = shutil.which("false")
+    frame = np.zeros((640, 960, 3), np.uint8)
+    writer = open_video(tmp_path / "one.mp4", 10.0, ffmpeg=program)
+    with pytest.raises(VideoError, match="could not write"), writer:
+        writer.add(frame)
+
+
+def test_a_gif_of_fast_frames_leaves_some_out_and_keeps_its_pace(tmp_path):
+    rng = np.random.Generator(np.random.PCG64(0))
+    with open_video(tmp_path / "one.gif", 20.0) as writer:
+        for _ in range(9):
+            writer.add(rng.integers(0, 255, (32, 48, 3), np.uint8))
+    with Image.open(tmp_path / "one.gif") as gif:
+        assert gif.n_frames == 5
+        assert gif.info["duration"] == 100

@@ -1,0 +1,147 @@
+"""Runs on a Ray cluster of this machine: the same bits as here, whatever happens to workers."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import io
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from di_envs.suites import load_suite
+from leaderboard.commands.cli import main
+from leaderboard.commands.ending import EXIT_USAGE
+from leaderboard.records.record import RunRecord
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import RunSpec, SetupError, plan_jobs
+from leaderboard.running.messages import Scene
+from leaderboard.running.runner import evaluate
+from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.wall_clock import Stopwatch
+from leaderboard.running.workers.ray_engine import RayEngine, check_footing
+from leaderboard.studies.study_file import read_study
+
+MISBEHAVING = Path(__file__).parents[1] / "misbehaving.py"
+FOLLOWER = f"{Path(__file__).parents[3] / 'examples' / 'your_own_agent.py'}:RouteFollower"
+TOY = load_suite("toy")
+ROUTE = TOY.specs()[0].route_id
+OPTIONS = {"suite": "toy", "traffic": 8, "walkers": 4, "route_ids": (ROUTE,)}
+# Ray's own warnings are not ours; starting a cluster takes ten seconds
+on_a_cluster = (
+    pytest.mark.skipif(
+        importlib.util.find_spec("ray") is None, reason="Ray is not installed: driveinsight[ray]"
+    ),
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore"),
+)
+
+
+def cluster(function):
+    for mark in on_a_cluster:
+        function = mark(function)
+    return function
+
+
+def evaluated(spec: RunSpec, seeds: list[int], folder: Path, said: io.StringIO) -> RunRecord:
+    return evaluate(
+        spec,
+        seeds,
+        suite=TOY,
+        folder=folder,
+        engine=RayEngine(workers=2),
+        console=Console(file=said, width=200),
+    )
+
+
+@cluster
+def test_the_bits_are_those_of_this_process_though_an_actor_dies(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(MISBEHAVING, "mine.py")  # named as in this folder, it is found from any other
+    spec = RunSpec(agent="mine.py:KillsItsParentThenItself", options=OPTIONS)
+    said = io.StringIO()
+    run = evaluated(spec, [0, 1, 2, 3], tmp_path / "run", said)
+    assert f"route {ROUTE}, seed 2: Failed - Worker died, tried again: the Ray " in said.getvalue()
+    assert run.complete
+    with Driver(spec) as driver:
+        here = [driver.drive(job).fingerprint() for job in plan_jobs([ROUTE], [0, 1, 2, 3])]
+    assert [record.fingerprint() for record in run.routes] == here
+
+
+class InterruptsWhenToldOf(io.StringIO):
+    """A person who presses Ctrl-C when a certain line comes up."""
+
+    def __init__(self, line: str) -> None:
+        super().__init__()
+        self._line, self._pressed = line, False
+
+    def write(self, text: str) -> int:
+        if self._line in text and not self._pressed:
+            self._pressed = True
+            os.kill(os.getpid(), signal.SIGINT)
+        return super().write(text)
+
+
+@cluster
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    spec = RunSpec(agent=f"{MISBEHAVING}:RaisesOnSeedTwo", options=OPTIONS)
+    said = InterruptsWhenToldOf("seed 2: Failed - Agent crashed")
+    run = evaluated(spec, [2, *range(10, 40)], tmp_path / "run", said)
+    assert 1 <= len(run.routes) < run.planned == 31
+    assert "interrupted: " in said.getvalue()
+
+
+@cluster
+def test_a_study_starts_one_cluster_for_all_its_rows(tmp_path, monkeypatch):
+    import ray
+
+    start, starts = ray.init, []
+    monkeypatch.setattr(ray, "init", lambda **options: (starts.append(options), start(**options)))
+    study = ["ablate", "--agent", FOLLOWER, "--suite", "toy", "--traffic", "8", "--walkers", "4"]
+    study += ["--route-ids", ROUTE, "--rows", "zero-routing", "--engine", "ray"]
+    assert main([*study, "--output", str(tmp_path)]) == 0
+    assert len(starts) == 1
+    before, null, edited = (driven.drives[0].episode for driven in read_study(tmp_path).rows)
+    assert before == null != edited
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    with set_up(RunSpec(agent="constant", options=OPTIONS), Stopwatch()) as driver:
+        return scene_of(driver)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"cpu": "z80"}, "differ in cpu"),
+        ({"versions": {"numpy": "1.0"}}, "differ in versions .*numpy 1.0"),
+        ({"agent_hash": "00"}, "differ in agent_hash"),
+    ],
+)
+def test_a_machine_that_would_give_other_bits_is_refused(scene, fields, message):
+    check_footing(scene, scene)
+    with pytest.raises(SetupError, match=message):
+        check_footing(scene, dataclasses.replace(scene, **fields))
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    run = ["evaluate", "--agent", "constant", "--suite", "toy", *arguments]
+    assert main(run) == EXIT_USAGE
+    return capsys.readouterr().err
+
+
+def test_without_ray_the_error_says_what_to_install(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    arguments = ["--engine", "ray", "--output", str(tmp_path / "run")]
+    assert "pip install 'driveinsight[ray]'" in refused(arguments, capsys)
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_address_needs_the_engine_that_it_is_of(capsys):
+    assert "--engine ray" in refused(["--address", "auto"], capsys)
