@@ -90,7 +90,7 @@ def test_the_digest_of_a_tick_covers_every_module_that_a_tick_runs():
 
 def test_every_kernel_of_ours_can_be_found():
     names = {path.name for path in kernel_sources()}
-    assert {"step.py", "traffic.py", "walkers.py", "geometry.py", "prompt.py"} <= names
+    assert {"step.py", "decisions.py", "strolling.py", "geometry.py", "prompt.py"} <= names
     assert "town.py" not in names
 
 
