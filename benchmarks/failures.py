@@ -17,10 +17,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from di_envs.course import load_course
 from di_envs.drawing.view import MAP_PX, Renderer
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import read_run
 from leaderboard.replaying.replay import replay, replay_env
-from leaderboard.scoring.rules import rules_named
 
 BEFORE_S = (3.0, 1.5, 0.0)  # moments before an infraction that are shown
 PANEL_PX, TITLE_PX, GAP_PX = 300, 26, 6

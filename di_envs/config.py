@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
 from di_envs.world.kinds import TICK_S, EventKind
@@ -18,7 +19,6 @@ OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
     "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}
 }
 EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
-RULES = ("carla-1.0", "carla-2.0", "carla-2.1")
 
 # Names of CARLA's presets (carla.WeatherParameters), the fourteen of the Leaderboard first.
 WEATHERS = (

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from di_envs.config import RouteEnvConfig, check_name
 from di_envs.observation import Observer, observation_space
-from di_envs.penalties import PENALTIES, Penalties
 from di_envs.reward import (
     Standing,
     infraction_penalty,
     reward_terms,
     score_metres,
 )
+from di_envs.rules import rules_named
+from di_envs.rules.penalties import Penalties
 from di_envs.suites import choose_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
@@ -164,7 +165,7 @@ def load_course(options: Mapping[str, Any]) -> Course:
         town=town,
         plans=plans,
         world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
-        penalties=PENALTIES[config.rules],
+        penalties=rules_named(config.rules).penalties,
         stops=tuple(EventKind[name.upper()] for name in config.terminate_on),
         junction_m={plan.route_id: junction_distances(town, plan) for plan in plans},
     )

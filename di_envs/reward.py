@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from di_envs.penalties import Penalties
+from di_envs.rules.penalties import Penalties
 from di_envs.world.state import EventKind, State
 
 

@@ -36,9 +36,9 @@ class ScoreByRules:
 
     def run(self) -> int:
         """Scores; returns the exit code."""
+        from di_envs.rules import rules_named
         from leaderboard.records.rescoring import rescored
         from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
-        from leaderboard.scoring.rules import rules_named
         from leaderboard.tables.comparison_table import rescoring_table
 
         try:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
 from leaderboard.pages.markup import Cell, Content, Heading, Markup, TableOf, element, joined
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
-from leaderboard.scoring.rules import rules_named
 from leaderboard.statistics.confidence import mean_interval
 from leaderboard.tables.run_tables import (
     mean_bound,

@@ -20,6 +20,7 @@ from typing import Any
 
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.carla.results import carla_results
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import (
@@ -35,7 +36,6 @@ from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay
 from leaderboard.running.interventions import observation_interventions, sort_interventions
 from leaderboard.running.jobs import Job, plan_jobs
 from leaderboard.running.log import EpisodeLog, route_record
-from leaderboard.scoring.rules import rules_named
 from wrappers.interventions.context import context_of
 
 AGENT_FAULTS = frozenset({AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID})

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from agents.base import Requirements
 from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
@@ -27,7 +28,6 @@ from leaderboard.running.interventions import sort_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.video import open_video
 from leaderboard.running.warm_up import warm_up
-from leaderboard.scoring.rules import rules_named
 
 Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
 

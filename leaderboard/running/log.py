@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.rules import Rules
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import TICK_S, ActorKind, EventKind
 from di_envs.world.world import Event, WorldView
@@ -30,7 +31,6 @@ from leaderboard.records.record import (
 )
 from leaderboard.running.bound import light_limited_bound
 from leaderboard.running.jobs import Job
-from leaderboard.scoring.rules import Rules
 from leaderboard.scoring.score import Progress, Score, score_route
 
 _ACTOR_TYPES: Mapping[int, str] = {

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
-from leaderboard.scoring.rules import rules_named
 from leaderboard.scoring.score import infractions_per_km
 from leaderboard.studies.effects import (
     ALPHA,

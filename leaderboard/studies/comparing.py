@@ -10,10 +10,10 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
 from leaderboard.records.footing import footing_differences, footing_of
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
-from leaderboard.scoring.rules import rules_named
 from leaderboard.statistics.bootstrap import DifferenceInterval, clustered_interval
 
 # Options of the environment that change what an agent sees or how often it decides, not the world

@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from di_envs.rules import Rules, rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
-from leaderboard.scoring.rules import Rules, rules_named
 from leaderboard.scoring.score import count_infractions, infractions_per_km
 from leaderboard.statistics.confidence import Interval, mean_interval
 

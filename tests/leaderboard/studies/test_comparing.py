@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from di_envs.rules import CARLA_2_1
 from di_envs.world.kinds import EventKind
 from leaderboard.commands.cli import main
 from leaderboard.records.rescoring import rescored
 from leaderboard.records.results import write_run
-from leaderboard.scoring.rules import CARLA_2_1
 from leaderboard.scoring.score import Score
 from leaderboard.studies.comparing import PairingError, compare_runs
 from leaderboard.tables.comparison_table import comparison_tables
