@@ -28,6 +28,7 @@ from di_envs.suites import choose_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.event_names import EVENT_KEYS, event_of_key
 from di_envs.world.state import TICK_S, EventKind
 from di_envs.world.world import Event, WorldConfig, WorldView
 
@@ -133,7 +134,7 @@ class Course:
             "junction_m": float(self.junction_m[plan.route_id][state.route_index[ego]]),
             "reward_terms": reward_terms(before, after, self.penalties),
             "events": events,
-            "finished": EventKind(finished).name.lower() if finished else "",
+            "finished": EVENT_KEYS[EventKind(finished)] if finished else "",
         }
 
 
@@ -166,7 +167,7 @@ def load_course(options: Mapping[str, Any]) -> Course:
         plans=plans,
         world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
         penalties=rules_named(config.rules).penalties,
-        stops=tuple(EventKind[name.upper()] for name in config.terminate_on),
+        stops=tuple(event_of_key(name) for name in config.terminate_on),
         junction_m={plan.route_id: junction_distances(town, plan) for plan in plans},
     )
 

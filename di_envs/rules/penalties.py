@@ -12,6 +12,7 @@ from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
 
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 
 
@@ -56,7 +57,7 @@ class Penalties:
     @cached_property
     def no_terms(self) -> Mapping[str, float]:
         """What the scored kinds take of a step without an infraction, by name: nothing."""
-        return MappingProxyType({kind.name.lower(): 0.0 for kind in self.scored})
+        return MappingProxyType({EVENT_KEYS[kind]: 0.0 for kind in self.scored})
 
     def infraction_score(
         self,

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import ClassVar
 
 from di_envs.rules.penalties import Penalties
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 
 PERFECT = "Perfect"  # what 2.x calls a route completed without an infraction
@@ -76,7 +77,7 @@ class Rules:
             ValueError: If it is neither scored, nor an ending, nor ignored.
         """
         if kind not in self.ignored and kind not in self.scored and kind not in self.endings:
-            name = kind.name.lower() if isinstance(kind, EventKind) else repr(kind)
+            name = EVENT_KEYS[kind] if isinstance(kind, EventKind) else repr(kind)
             raise ValueError(
                 f"the rules {self.name} do not say what the event {name} costs: score it by the "
                 "program that recorded it"

@@ -17,6 +17,7 @@ import numpy as np
 
 from di_envs.route_env import RouteEnv
 from di_envs.town.town import Town
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import TICK_S
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
@@ -270,7 +271,7 @@ def event_heads(record: RouteRecord, run: RunRecord) -> list[dict[str, Any]]:
     return [
         {
             "time_s": event.time_s,
-            "kind": event.kind.name.lower(),
+            "kind": EVENT_KEYS[event.kind],
             "text": event_text(event),
             "with": met(event),
             "x": round(event.x, 2),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from di_envs.rules import rules_named
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from leaderboard.pages.markup import Cell, Content, Heading, Markup, TableOf, element, joined
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
@@ -54,9 +55,9 @@ def event_text(event: EventRecord) -> str:
     if event.kind == EventKind.COMPLETED:
         return "route completed"
     if event.kind == EventKind.OUTSIDE_LANES:
-        return f"outside lanes for {event.value:.1f} m"
+        return f"{EVENT_NAMES[event.kind]} for {event.value:.1f} m"
     if event.kind == EventKind.MIN_SPEED:
-        return f"at {event.value:.0f} % of the traffic's pace"
+        return f"{EVENT_NAMES[event.kind]}: {event.value:.0f} % of the traffic's pace"
     return EVENT_NAMES[event.kind]
 
 
@@ -170,7 +171,7 @@ def event_table(run: RunRecord, records: Sequence[RouteRecord], shown: set[int])
             time: Content = f"{event.time_s:.2f}"
             if record.index in shown:
                 time = moment_link(record, event.time_s, time)
-            mark = element("span", "", class_=f"dot kind-{event.kind.name.lower()}")
+            mark = element("span", "", class_=f"dot kind-{EVENT_KEYS[event.kind]}")
             rows.append(
                 [
                     Cell(shows=record.route_id),

@@ -36,6 +36,7 @@ from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay
 from leaderboard.running.interventions import observation_interventions, sort_interventions
 from leaderboard.running.jobs import Job, plan_jobs
 from leaderboard.running.log import EpisodeLog, route_record
+from leaderboard.scoring.names import EVENT_NAMES
 from wrappers.interventions.context import context_of
 
 AGENT_FAULTS = frozenset({AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID})
@@ -231,7 +232,7 @@ def _event_differences(
         yield f"{len(claimed)} events are claimed, the replay has {len(replayed)}"
     for number, (one, other) in enumerate(zip(claimed, replayed, strict=False)):
         if one != other:
-            name = f"event {number} ({other.kind.name.lower()} at {other.time_s:g} s)"
+            name = f"event {number} ({EVENT_NAMES[other.kind]} at {other.time_s:g} s)"
             yield from _part_differences(name, one, other)
             return  # what follows is often only shifted
 

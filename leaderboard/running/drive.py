@@ -28,6 +28,7 @@ from leaderboard.running.interventions import sort_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.video import open_video
 from leaderboard.running.warm_up import warm_up
+from leaderboard.scoring.names import EVENT_NAMES
 
 Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
 
@@ -119,7 +120,7 @@ class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 def event_line(event: Event) -> str:
     """An event as a line: `  12.3 s  red light at (10.0, -4.5)`."""
-    name = event.kind.name.lower().replace("_", " ")
+    name = EVENT_NAMES[event.kind]
     metres = f", {event.value:.1f} m" if event.value else ""
     place = f"({event.x:.1f}, {event.y:.1f})"
     return escape(f"{event.tick * TICK_S:7.1f} s  {name}{metres} at {place}")

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from di_envs.rules import rules_named
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from leaderboard.scoring.score import infractions_per_km
+from leaderboard.statistics.bootstrap import expanded_interval
+from leaderboard.statistics.rank_correlation import spearman
 from leaderboard.studies.effects import (
     ALPHA,
     EQUIVALENT,
@@ -19,8 +22,6 @@ from leaderboard.studies.effects import (
     MATTERS,
     Effect,
     effect,
-    interval,
-    spearman,
 )
 from leaderboard.studies.record import Drive, DrivenRow, Study
 from leaderboard.studies.rows import NULL, WAYS
@@ -182,12 +183,12 @@ def _per_km(pairs: Pairs, rules: str) -> dict[str, float]:
     for kind in rules_named(rules).infractions:
         before, after = (_rate([pair[side] for pair in pairs], kind) for side in (0, 1))
         if after != before:
-            found[kind.name.lower()] = after - before
+            found[EVENT_KEYS[kind]] = after - before
     return found
 
 
 def _rate(drives: Sequence[Drive], kind: EventKind) -> float:
-    count = sum(drive.events.get(kind.name.lower(), 0) for drive in drives)
+    count = sum(drive.events.get(EVENT_KEYS[kind], 0) for drive in drives)
     return infractions_per_km(count, math.fsum(drive.done_m for drive in drives))
 
 
@@ -203,7 +204,7 @@ def _correlation(way: str, rows: Sequence[RowFinding]) -> Correlation:
         draws = [spearman(list(ours), theirs) for ours in columns]
         known = np.array([each for each in draws if each is not None])
         if len(known) > len(draws) // 2:
-            low, high = interval(known, rows[0].difference.routes, ALPHA / 2.0)
+            low, high = expanded_interval(known, rows[0].difference.routes, ALPHA / 2.0)
     return Correlation(group=way, rho=rho, low=low, high=high, rows=len(rows))
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from di_envs.world.event_names import EVENT_KEYS
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.studies.rows import BASELINE, NULL, Row
 
@@ -40,7 +41,7 @@ class Drive:
     @classmethod
     def of(cls, record: RouteRecord) -> Drive:
         """What a study keeps of a route's record."""
-        counts = Counter(event.kind.name.lower() for event in record.events)
+        counts = Counter(EVENT_KEYS[event.kind] for event in record.events)
         return cls(
             route_id=record.route_id,
             seed=record.seed,

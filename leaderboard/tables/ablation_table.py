@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from di_envs.world.kinds import EventKind
+from di_envs.world.event_names import event_of_key
 from leaderboard.scoring.names import EVENT_NAMES
 from leaderboard.studies.ablation import Ablation, RowFinding, sentences
 from leaderboard.studies.effects import ALPHA, EQUIVALENT, MARGIN_DS, MATTERS, POWER
@@ -114,7 +114,7 @@ def infraction_text(row: RowFinding) -> str:
 
 
 def _kind(name: str) -> str:
-    return EVENT_NAMES.get(EventKind[name.upper()], name)
+    return EVENT_NAMES[event_of_key(name)]
 
 
 def time_text(seconds: float) -> str:

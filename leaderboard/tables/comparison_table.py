@@ -12,7 +12,7 @@ from rich.text import Text
 
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES
-from leaderboard.statistics.bootstrap import DifferenceInterval
+from leaderboard.statistics.bootstrap import BootstrapInterval
 from leaderboard.studies.comparing import SCORES, Comparison, Pair
 
 _NAMES = {"driving_score": "DS", "route_completion": "RC", "infraction_score": "IS"}
@@ -48,14 +48,14 @@ def _score_table(comparison: Comparison) -> Table:
             _NAMES[score],
             f"{math.fsum(ours) / len(ours):.{digits}f}",
             f"{math.fsum(theirs) / len(theirs):.{digits}f}",
-            f"{interval.mean + 0.0:+.{digits}f}",
+            f"{interval.value + 0.0:+.{digits}f}",
             _interval_text(interval, digits),
             style="bold" if interval.clear else None,
         )
     return table
 
 
-def _interval_text(interval: DifferenceInterval, digits: int) -> str:
+def _interval_text(interval: BootstrapInterval, digits: int) -> str:
     if interval.low is None or interval.high is None:
         return "-"
     return f"{interval.low + 0.0:+.{digits}f} … {interval.high + 0.0:+.{digits}f}"
@@ -104,8 +104,7 @@ def _reasons(pair: Pair) -> str:
 
 
 def _event_text(event: EventRecord) -> str:
-    name = EVENT_NAMES.get(event.kind, event.kind.name.lower().replace("_", " "))
-    return f"{name} ({event.time_s:.1f} s)"
+    return f"{EVENT_NAMES[event.kind]} ({event.time_s:.1f} s)"
 
 
 def _plain(status: str) -> str:

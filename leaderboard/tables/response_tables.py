@@ -19,7 +19,7 @@ from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
 from leaderboard.responding.drive_responses import DriveResponses
 from leaderboard.responding.heads import HeadConsistency, head_consistency, verdict_of_heads
-from leaderboard.statistics.resampling import Interval
+from leaderboard.statistics.bootstrap import BootstrapInterval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,13 +206,13 @@ def as_values(
     }
 
 
-def _values(interval: Interval) -> dict[str, float | int | None]:
+def _values(interval: BootstrapInterval) -> dict[str, float | int | None]:
     value = interval.value if math.isfinite(interval.value) else None
     return {
         "value": value,
         "low": interval.low,
         "high": interval.high,
-        "routes": interval.routes,
+        "routes": interval.clusters,
     }
 
 
@@ -220,11 +220,11 @@ def _routes(drives: Sequence[DriveResponses]) -> int:
     return len({drive.route_hash for drive in drives})
 
 
-def _mean(interval: Interval) -> str:
+def _mean(interval: BootstrapInterval) -> str:
     return _with_ends(interval, "{:.3g}")
 
 
-def _give_or_take(interval: Interval) -> str:
+def _give_or_take(interval: BootstrapInterval) -> str:
     """`2.74 ±0.26`: half the interval's width."""
     if not math.isfinite(interval.value):
         return "-"
@@ -233,11 +233,11 @@ def _give_or_take(interval: Interval) -> str:
     return f"{interval.value:.3g} ±{(interval.high - interval.low) / 2.0:.2g}"
 
 
-def _ratio(interval: Interval) -> str:
+def _ratio(interval: BootstrapInterval) -> str:
     return _with_ends(interval, "{:.2f}")
 
 
-def _with_ends(interval: Interval, form: str) -> str:
+def _with_ends(interval: BootstrapInterval, form: str) -> str:
     """`1.31 (1.20 … 1.42)`; the value alone where there are too few routes for ends."""
     if not math.isfinite(interval.value):
         return "-"

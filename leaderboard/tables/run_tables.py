@@ -15,7 +15,7 @@ from di_envs.rules import Rules, rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
 from leaderboard.scoring.score import count_infractions, infractions_per_km
-from leaderboard.statistics.confidence import Interval, mean_interval
+from leaderboard.statistics.confidence import MeanInterval, mean_interval
 
 
 def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int]) -> list[float]:
@@ -87,7 +87,7 @@ def _mean_cells(run: RunRecord) -> list[str]:
     ]
 
 
-def driving_interval(run: RunRecord) -> Interval:
+def driving_interval(run: RunRecord) -> MeanInterval:
     """The run's mean DS, with the t-interval of its means by seed."""
     return mean_interval(seed_means(run.scored, "driving_score", run.seeds))
 
