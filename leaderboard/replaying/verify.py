@@ -33,9 +33,10 @@ from leaderboard.records.record import (
 )
 from leaderboard.records.results import CARLA_FILE, RECORD_FILE, route_files, run_folder
 from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
+from leaderboard.running.finished_route import route_record
 from leaderboard.running.interventions import observation_interventions, sort_interventions
 from leaderboard.running.jobs import Job, plan_jobs
-from leaderboard.running.log import EpisodeLog, route_record
+from leaderboard.running.log import EpisodeLog
 from leaderboard.scoring.names import EVENT_NAMES
 from wrappers.interventions.context import context_of
 

@@ -27,8 +27,9 @@ from leaderboard.records.record import (
     SIMULATION_CRASHED,
     RouteRecord,
 )
+from leaderboard.running.finished_route import lost_record, route_record
 from leaderboard.running.jobs import Job
-from leaderboard.running.log import EpisodeLog, lost_record, route_record
+from leaderboard.running.log import EpisodeLog
 
 _LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
 _CONTROL_NAMES = ("throttle", "steer", "brake")

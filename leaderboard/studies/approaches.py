@@ -16,7 +16,7 @@ from di_envs.route_env import RouteEnv
 from di_envs.town.lanes import LightState
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.replay import replay
-from leaderboard.running.bound import PerfectDriver, StopPoint, stop_points
+from leaderboard.running.perfect_driver import PerfectDriver, StopPoint, stop_points
 from leaderboard.statistics.claim_verdict import ClaimVerdict
 from leaderboard.studies.effects import Effect, share_effect
 from leaderboard.studies.experiments import Judgement
