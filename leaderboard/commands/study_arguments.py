@@ -40,7 +40,7 @@ class StudyArguments(EngineArguments, SceneArguments):
         """Drives the study, or shows one; returns the exit code."""
         from leaderboard.records.results import ResultsError
         from leaderboard.running.jobs import SetupError
-        from leaderboard.studies.study_error import StudyError
+        from leaderboard.studies import StudyError
 
         try:
             return self._drive() if self.show is None else self._show(self.show)
@@ -64,7 +64,7 @@ class StudyArguments(EngineArguments, SceneArguments):
         raise NotImplementedError
 
     def _show(self, path: Path) -> int:
-        from leaderboard.studies.study_error import StudyError
+        from leaderboard.studies import StudyError
         from leaderboard.studies.study_file import read_study
 
         study = read_study(path)

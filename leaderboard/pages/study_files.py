@@ -10,7 +10,9 @@ from rich.text import Text
 from leaderboard.pages.ablation_picture import write_ablation_picture
 from leaderboard.pages.prompt_pictures import write_prompt_picture
 from leaderboard.records.results import replace_file
-from leaderboard.studies.ablation import Ablation, findings, work_out
+from leaderboard.studies import StudyError
+from leaderboard.studies.ablation import Ablation, work_out
+from leaderboard.studies.ablation_findings import findings
 from leaderboard.studies.experiments import EXPERIMENTS
 from leaderboard.studies.prompt_editing import (
     MISSING,
@@ -19,7 +21,6 @@ from leaderboard.studies.prompt_editing import (
     prompt_findings,
 )
 from leaderboard.studies.record import Study
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import write_study
 from leaderboard.tables.ablation_table import (
     ablation_markdown,

@@ -13,8 +13,8 @@ from typing import Any
 
 from di_envs.config import check_name
 from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.rows import Row
-from leaderboard.studies.study_error import StudyError
 
 LATERAL_M = 2.0  # over half a lane: into the neighbour's, or to the kerb
 MOVED = ("routing", "target_point", "routing+target_point")

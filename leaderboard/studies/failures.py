@@ -16,7 +16,7 @@ from leaderboard.studies.ablation import Pairs, paired
 from leaderboard.studies.effects import Effect, share_effect
 from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
-from leaderboard.studies.record import Drive, Study
+from leaderboard.studies.record import Study, StudyDrive
 
 FAILURES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -62,7 +62,7 @@ def _no_increase(found: Effect) -> bool:
     return found.inner_high is not None and found.inner_high < NO_INCREASE
 
 
-def has_failed(drive: Drive, failure: str) -> float:
+def has_failed(drive: StudyDrive, failure: str) -> float:
     """1 if a failure happened in a drive, else 0."""
     kinds = sum(FAILURES.values(), ()) if failure == ANY else FAILURES[failure]
     return float(any(drive.events.get(kind, 0) for kind in kinds))

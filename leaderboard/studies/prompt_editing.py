@@ -14,6 +14,7 @@ from leaderboard.records.results import RECORD_FILE, read_run
 from leaderboard.replaying.replay import ReplayError, replay_env
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.approaches import Approach, approaches, judge_lights
 from leaderboard.studies.experiments import Experiment, Judgement
 from leaderboard.studies.failures import judge_bev, judge_map
@@ -21,7 +22,6 @@ from leaderboard.studies.lateral import judge_route, lateral_offsets
 from leaderboard.studies.record import Study
 from leaderboard.studies.rows import BASELINE
 from leaderboard.studies.speed_sweep import judge_speed, sweep
-from leaderboard.studies.study_error import StudyError
 
 JUDGEMENTS, MISSING = "judgements", "missing"  # in a study's `extra`
 

@@ -28,10 +28,10 @@ from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.episode import close_agent
 from leaderboard.statistics.bootstrap import expanded_interval
 from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
+from leaderboard.studies import StudyError
 from leaderboard.studies.effects import ALPHA, Effect, effect
 from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
-from leaderboard.studies.study_error import StudyError
 from wrappers.interventions.editing import ObservationEditing
 
 DOSES_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0)

@@ -11,7 +11,8 @@ from rich.text import Text
 
 from di_envs.world.event_names import event_of_key
 from leaderboard.scoring.names import EVENT_NAMES
-from leaderboard.studies.ablation import Ablation, RowFinding, sentences
+from leaderboard.studies.ablation import Ablation, RowFinding
+from leaderboard.studies.ablation_findings import sentences
 from leaderboard.studies.effects import ALPHA, EQUIVALENT, MARGIN_DS, MATTERS, POWER
 from leaderboard.studies.record import DrivenRow, Study
 from leaderboard.studies.rows import BASELINE, NULL

@@ -22,6 +22,7 @@ from leaderboard.pages.prompt_pictures import write_prompt_picture
 from leaderboard.records.results import write_run
 from leaderboard.replaying.replay import replay_env
 from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.approaches import (
     GREEN_SHOWN,
     RED_SHOWN,
@@ -38,7 +39,6 @@ from leaderboard.studies.prompt_editing import finding_sentence
 from leaderboard.studies.record import DrivenRow
 from leaderboard.studies.route_place import RoutePlace, offsets
 from leaderboard.studies.speed_sweep import DOSES_MPS, judge_speed, path_length, sweep
-from leaderboard.studies.study_error import StudyError
 from tests.leaderboard.made_records import route, run_of
 from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.studies.drives_here import FOLLOWER, drive, row, study
