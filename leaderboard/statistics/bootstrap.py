@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 RESAMPLES = 10_000
 TAIL = 0.025  # beyond each end of a 95 % interval
 FEWEST_OF_MOMENTS = 3  # of fewer routes' moments no interval is given: it would say far too much
+FEW_ROUTES = 10  # fewer distinct ones make an interval too narrow: tables say so
 _STREAM = b"driveinsight compare"
 _BYTES = 8
 

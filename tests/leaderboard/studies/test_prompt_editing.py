@@ -122,10 +122,10 @@ def test_a_drive_that_ended_at_once_says_nothing():
 @pytest.mark.parametrize(
     ("shares", "verdict"),
     [
-        ((0.1, 0.0, 0.9).HOLDS),
-        ((0.9, 0.0, 0.9).DOES_NOT_HOLD),  # routing alone is enough
-        ((0.1, 0.0, 0.2).DOES_NOT_HOLD),  # both together are not
-        ((0.495, 0.0, 0.9).UNDECIDED),
+        ((0.1, 0.0, 0.9), ClaimVerdict.HOLDS),
+        ((0.9, 0.0, 0.9), ClaimVerdict.DOES_NOT_HOLD),  # routing alone is enough
+        ((0.1, 0.0, 0.2), ClaimVerdict.DOES_NOT_HOLD),  # both together are not
+        ((0.495, 0.0, 0.9), ClaimVerdict.UNDECIDED),
     ],
 )
 def test_the_route_experiment_asks_who_takes_the_ego_along(shares, verdict, tmp_path):
