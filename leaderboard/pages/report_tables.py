@@ -14,6 +14,7 @@ from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
 from leaderboard.statistics.confidence import mean_interval
 from leaderboard.tables.run_tables import (
     mean_bound,
+    plain_status,
     scored_per_km,
     seed_means,
     summary,
@@ -104,7 +105,7 @@ def _route_row(run: RunRecord, record: RouteRecord, *, replayed: bool) -> list[C
     ]
     if record.lost:
         dashes = [Cell(shows="-", sort=-1.0) for _ in range(7)]
-        why = Cell(shows=element("span", f"lost: {_plain(record)}", class_="lost"))
+        why = Cell(shows=element("span", f"lost: {plain_status(record.status)}", class_="lost"))
         return [*first, *dashes, why, Cell(shows=record.reason), Cell(shows="")]
     score = record.score
     bound = "-" if record.bound is None else f"{record.bound.route_completion:.1f}"
@@ -117,14 +118,10 @@ def _route_row(run: RunRecord, record: RouteRecord, *, replayed: bool) -> list[C
         Cell(shows=f"{scored_per_km([record], run):.2f}"),
         Cell(shows=f"{record.done_m / 1000:.2f}", note=f"of {record.length_m / 1000:.2f} km"),
         Cell(shows=f"{record.game_s:.1f}", sort=record.game_s),
-        Cell(shows=_plain(record), note=record.reason or None),
+        Cell(shows=plain_status(record.status), note=record.reason or None),
         Cell(shows=summary([record], rules_named(run.rules))),
         Cell(shows=scenarios_text(record)),
     ]
-
-
-def _plain(record: RouteRecord) -> str:
-    return record.status.removeprefix("Failed - ")
 
 
 def _interventions(record: RouteRecord) -> str | None:

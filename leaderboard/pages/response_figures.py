@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 from leaderboard.responding.moments import moment_name, stretches
 
 MOMENT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:olive")
@@ -79,7 +79,7 @@ def gradient_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     for place, (axes, name) in enumerate(zip(rows, drive.groups, strict=False)):
         axes.plot(drive.time_s, drive.gradient[:, place, 0], color="#1f4e79", lw=1.2, label="Gx")
         axes.plot(drive.time_s, drive.gradient[:, place, 1], color="#c8553d", lw=1.2, label="Gy")
-        axes.set_ylabel(plain_name(name), rotation=0, ha="right", va="center", fontsize=9)
+        axes.set_ylabel(plain_words(name), rotation=0, ha="right", va="center", fontsize=9)
         axes.set_ylim(bottom=0.0)
         axes.yaxis.set_label_coords(-0.055, 0.5)
         _finish(axes, drive, marked)
@@ -110,7 +110,7 @@ def attention_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
         axes.set_xlabel("game time [s]", fontsize=8)
     patches = [_patch(colour) for colour in _colours(drive)]
     figure.legend(
-        patches, [plain_name(name) for name in drive.groups], loc="outside lower center", ncols=5
+        patches, [plain_words(name) for name in drive.groups], loc="outside lower center", ncols=5
     )
     return figure
 
@@ -134,7 +134,7 @@ def head_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
             _head_title(axes, layer, head)
             axes.tick_params(labelsize=7)
     for axes in panels[-1]:
-        labels = [plain_name(name) for name in drive.groups]
+        labels = [plain_words(name) for name in drive.groups]
         axes.set_xticks(np.arange(count), labels, rotation=90, fontsize=7)
     names = [moment_name(drive, index) for index in marked]
     patches = [_patch(_colour(place)) for place in range(len(marked))]
@@ -156,7 +156,7 @@ def _situation_strips(axes: Any, drive: DriveResponses) -> None:
         for first, last in stretches(drive.holding(name)):
             start, end = drive.time_s[first] - half, drive.time_s[last - 1] + half
             axes.barh(row, end - start, left=start, height=0.8, color=SITUATION_COLOURS[name])
-    names = [plain_name(name) for name in drive.situations]
+    names = [plain_words(name) for name in drive.situations]
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.invert_yaxis()
 
@@ -190,8 +190,3 @@ def _colour(place: int) -> str:
 
 def _colours(drive: DriveResponses) -> list[str]:
     return [GROUP_COLOURS[place % len(GROUP_COLOURS)] for place in range(len(drive.groups))]
-
-
-def plain_name(name: str) -> str:
-    """`stop sign` of `stop_sign`."""
-    return name.replace("_", " ")

@@ -8,9 +8,9 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from leaderboard.pages.response_figures import DPI, SITUATION_COLOURS, plain_name
+from leaderboard.pages.response_figures import DPI, SITUATION_COLOURS
 from leaderboard.responding.by_situation import ratios_in
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 
 
 def situation_figure(drives: Sequence[DriveResponses]) -> Figure:
@@ -33,7 +33,7 @@ def situation_figure(drives: Sequence[DriveResponses]) -> Figure:
             colour = SITUATION_COLOURS[name]
             if ratio.low is not None and ratio.high is not None:
                 axes.plot([ratio.low, ratio.high], [height, height], color=colour, lw=2.4)
-            label = plain_name(name) if place == 0 else None
+            label = plain_words(name) if place == 0 else None
             axes.plot(ratio.value, height, "o", ms=4.5, color=colour, label=label)
     axes.axvline(1.0, color="black", lw=1.0)
     axes.set_xscale("log")
@@ -41,7 +41,7 @@ def situation_figure(drives: Sequence[DriveResponses]) -> Figure:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.tick_params(labelsize=8)
-    axes.set_yticks(range(len(groups)), [plain_name(name) for name in groups], fontsize=9)
+    axes.set_yticks(range(len(groups)), [plain_words(name) for name in groups], fontsize=9)
     axes.invert_yaxis()
     axes.grid(axis="x", which="both", alpha=0.25)
     axes.set_xlabel("ratio of mean strengths, 95 % intervals over routes")

@@ -146,6 +146,11 @@ def drive_responses(
     )
 
 
+def plain_words(name: str) -> str:
+    """`stop sign` of `stop_sign`: a component or situation as people read it."""
+    return name.replace("_", " ")
+
+
 def drive_hash(record: RouteRecord) -> str:
     """Of all that a drive was, but for the time that it took."""
     return hashlib.blake2b(repr(record.fingerprint()).encode(), digest_size=8).hexdigest()

@@ -14,6 +14,7 @@ from leaderboard.records.record import EventRecord
 from leaderboard.scoring.names import EVENT_NAMES
 from leaderboard.statistics.bootstrap import FEW_ROUTES, BootstrapInterval
 from leaderboard.studies.comparing import SCORES, Comparison, Pair
+from leaderboard.tables.run_tables import plain_status
 
 _NAMES = {"driving_score": "DS", "route_completion": "RC", "infraction_score": "IS"}
 _DECIMALS = {"driving_score": 2, "route_completion": 2, "infraction_score": 3}
@@ -90,7 +91,7 @@ def _reasons(pair: Pair) -> str:
     if pair.new:
         parts.append(f"new: {', '.join(map(_event_text, pair.new))}")
     if pair.before.crashed != pair.after.crashed:
-        parts.append(f"{_plain(pair.before.status)}, then {_plain(pair.after.status)}")
+        parts.append(f"{plain_status(pair.before.status)}, then {plain_status(pair.after.status)}")
     if not parts:
         before, after = pair.before.score, pair.after.score
         if before.route_completion != after.route_completion:
@@ -104,10 +105,6 @@ def _reasons(pair: Pair) -> str:
 
 def _event_text(event: EventRecord) -> str:
     return f"{EVENT_NAMES[event.kind]} ({event.time_s:.1f} s)"
-
-
-def _plain(status: str) -> str:
-    return status.removeprefix("Failed - ")
 
 
 def _caption(comparison: Comparison, changed: int) -> str:

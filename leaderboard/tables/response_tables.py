@@ -10,7 +10,7 @@ from pathlib import Path
 from agents.explain.situations import SAYS
 from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 from leaderboard.responding.heads import HeadConsistency, head_consistency, verdict_of_heads
 from leaderboard.responding.response_values import response_values
 from leaderboard.statistics.bootstrap import BootstrapInterval
@@ -48,15 +48,15 @@ def situation_rows(drives: Sequence[DriveResponses]) -> TextTable:
     names = [name for name in drives[0].situations if moments[name]]
     return TextTable(
         title=f"Mean response by situation: {drives[0].name}",
-        columns=("component", *(f"{_plain(name)}\n{moments[name]} moments" for name in names)),
+        columns=("component", *(f"{plain_words(name)}\n{moments[name]} moments" for name in names)),
         rows=tuple(
-            (_plain(group), *(_give_or_take(cells[name]) for name in names))
+            (plain_words(group), *(_give_or_take(cells[name]) for name in names))
             for group, cells in found.items()
         ),
         notes=(
             "Length of (Gx, Gy), metres of the mean waypoint per unit of token, over "
             f"{len(drives)} drives of {_routes(drives)} distinct routes; ± half a 95 % interval.",
-            *(f"{_plain(name)}: {SAYS[name]}" for name in names if name in SAYS),
+            *(f"{plain_words(name)}: {SAYS[name]}" for name in names if name in SAYS),
         ),
     )
 
@@ -71,8 +71,8 @@ def claim_rows(found: Sequence[Finding]) -> TextTable:
         rows.append(
             (
                 str(sentences.index((claim.sentence, claim.source)) + 1),
-                f"{_plain(claim.component)} {claim.kind}",
-                _plain(claim.when),
+                f"{plain_words(claim.component)} {claim.kind}",
+                plain_words(claim.when),
                 str(each.moments),
                 _ratio(each.strength),
                 each.verdict,
@@ -104,7 +104,7 @@ def head_rows(found: HeadConsistency) -> TextTable:
             (
                 f"layer {layer}",
                 *(
-                    f"{found.heads[layer, head]:.2f} {_plain(found.favourites[layer][head])}"
+                    f"{found.heads[layer, head]:.2f} {plain_words(found.favourites[layer][head])}"
                     for head in range(heads)
                 ),
             )
@@ -149,7 +149,3 @@ def _with_ends(interval: BootstrapInterval, form: str) -> str:
     if interval.low is None or interval.high is None:
         return value
     return f"{value} ({form.format(interval.low)} … {form.format(interval.high)})"
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")

@@ -120,13 +120,13 @@ def summary(records: Sequence[RouteRecord], rules: Rules) -> str:
     kinds = count_infractions((event.kind for r in driven for event in r.events), rules)
     parts = [f"{count} {EVENT_NAMES[kind]}" for kind, count in kinds.items() if count]
     crashes = Counter(record.status for record in driven if record.crashed)
-    parts += [f"{count} {_plain_status(status)}" for status, count in crashes.items()]
+    parts += [f"{count} {plain_status(status)}" for status, count in crashes.items()]
     lost = Counter(record.status for record in records if record.lost)
-    parts += [f"{count} lost ({_plain_status(status)})" for status, count in lost.items()]
+    parts += [f"{count} lost ({plain_status(status)})" for status, count in lost.items()]
     return ", ".join(parts)
 
 
-def _plain_status(status: str) -> str:
+def plain_status(status: str) -> str:
     """A status without the word that they share: `Worker died`."""
     return status.removeprefix("Failed - ")
 
