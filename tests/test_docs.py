@@ -21,8 +21,8 @@ from di_envs.edits.conditions import Condition
 from di_envs.edits.text import read_edits
 from di_envs.edits.world import WORLD_EDITS, read_world_edits
 from di_envs.observation import observation_space
-from di_envs.penalties import PENALTIES
 from di_envs.reward import Standing, reward_terms
+from di_envs.rules import CARLA_1_0
 from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
 from leaderboard.commands.cli import Command, Evaluate
@@ -204,7 +204,7 @@ def test_the_table_of_observations_is_the_space():
 def test_the_tables_of_events_and_rewards_are_the_rules():
     told = rows(CONVENTIONS, 3)
     assert {kind.name.lower() for kind in EventKind} <= told.keys()
-    for kind, factor in PENALTIES["carla-1.0"].costs.items():
+    for kind, factor in CARLA_1_0.penalties.costs.items():
         assert told[kind.name.lower()][-1] == f"score x {factor:.2f}"
     still = Standing(0.0, 0.0, (0,) * EVENT_KINDS)
-    assert reward_terms(still, still, PENALTIES["carla-1.0"]).keys() <= rows(CONVENTIONS, 2).keys()
+    assert reward_terms(still, still, CARLA_1_0.penalties).keys() <= rows(CONVENTIONS, 2).keys()

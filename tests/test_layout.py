@@ -24,7 +24,7 @@ FLOORS = {
         {"numerics"},
         {"town"},
         {"world"},
-        {"sensors", "actions", "highway"},
+        {"rules", "sensors", "actions", "highway"},
         {"", "drawing", "edits"},
     ),
     "agents": (

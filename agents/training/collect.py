@@ -38,6 +38,7 @@ from agents.training.towns import town_files
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
 from di_envs.town.plan import RoadOption
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from di_envs.world.world import Event
 
@@ -261,7 +262,7 @@ def _drive(job: DriveJob) -> tuple[Drive, str]:
     drive = dataclasses.replace(log.drive(facts), shown=shown)
     if finished == "timeout" and shown is None:
         drive = without_standing_tail(drive)
-    faults = [event.kind.name.lower() for event in events if event.kind in FAULTS]
+    faults = [EVENT_KEYS[event.kind] for event in events if event.kind in FAULTS]
     if faults and shown is None:
         return drive, f"infractions: {', '.join(faults)}"
     if len(drive) < LEAST_MOMENTS:

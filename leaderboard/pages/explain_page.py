@@ -23,8 +23,9 @@ from leaderboard.explaining.explanation import Answer, Explanation, WhatIf
 from leaderboard.pages.explain_tables import answers_table, telling_events
 from leaderboard.pages.looks import look_columns, map_columns
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
-from leaderboard.pages.report_page import event_heads, film_meta, player_parts
+from leaderboard.pages.report_page import player_parts
 from leaderboard.pages.report_tables import event_text, facts_table
+from leaderboard.pages.route_films import event_heads, film_meta
 from leaderboard.pages.told import told_columns
 from leaderboard.pages.town_svg import town_svg
 from leaderboard.records.blocks import Column, write_block

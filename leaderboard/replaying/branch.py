@@ -18,6 +18,7 @@ import numpy as np
 from di_envs.edits.text import EditError
 from di_envs.edits.world import WorldEdit
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.episode_hash import observation_check
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.replay import replay_env, sensor_options
@@ -25,7 +26,6 @@ from leaderboard.replaying.timed_edits import EditPlan, TimedEdit, decisions_bef
 from leaderboard.running.episode import drive_route
 from leaderboard.running.interventions import sort_interventions
 from leaderboard.running.jobs import Job
-from leaderboard.scoring.rules import rules_named
 
 
 class BranchError(Exception):

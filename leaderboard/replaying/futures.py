@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from agents.base import Agent, Control, Observation
 from di_envs.edits.world import apply_world_edits
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from di_envs.saving import EnvSnapshot, restore
 from di_envs.world.state import TICK_S
 from leaderboard.records.episode_hash import observation_check
@@ -28,7 +29,6 @@ from leaderboard.replaying.timed_edits import EditPlan, timed_edits
 from leaderboard.replaying.what_if import Question
 from leaderboard.running.episode import control_error, describe, extra_keys
 from leaderboard.running.log import event_record
-from leaderboard.scoring.rules import rules_named
 from wrappers.interventions.context import context_of
 
 AHEAD_S = 15.0  # how far futures are driven, unless somebody says

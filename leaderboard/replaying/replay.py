@@ -22,8 +22,8 @@ from di_envs.world.state import TICK_S
 from di_envs.world.world import Event, WorldView
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.timed_edits import EditPlan, decisions_before, timed_edits
+from leaderboard.running.finished_route import route_hash
 from leaderboard.running.jobs import Job
-from leaderboard.running.log import route_hash
 
 CHEAPEST = ("inertial",)  # the group of observations that costs least
 _SENSOR_OPTIONS = ("observations", "cameras", "lidar")

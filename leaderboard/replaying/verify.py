@@ -20,6 +20,7 @@ from typing import Any
 
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.carla.results import carla_results
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import (
@@ -32,10 +33,11 @@ from leaderboard.records.record import (
 )
 from leaderboard.records.results import CARLA_FILE, RECORD_FILE, route_files, run_folder
 from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
+from leaderboard.running.finished_route import route_record
 from leaderboard.running.interventions import observation_interventions, sort_interventions
 from leaderboard.running.jobs import Job, plan_jobs
-from leaderboard.running.log import EpisodeLog, route_record
-from leaderboard.scoring.rules import rules_named
+from leaderboard.running.log import EpisodeLog
+from leaderboard.scoring.names import EVENT_NAMES
 from wrappers.interventions.context import context_of
 
 AGENT_FAULTS = frozenset({AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID})
@@ -231,7 +233,7 @@ def _event_differences(
         yield f"{len(claimed)} events are claimed, the replay has {len(replayed)}"
     for number, (one, other) in enumerate(zip(claimed, replayed, strict=False)):
         if one != other:
-            name = f"event {number} ({other.kind.name.lower()} at {other.time_s:g} s)"
+            name = f"event {number} ({EVENT_NAMES[other.kind]} at {other.time_s:g} s)"
             yield from _part_differences(name, one, other)
             return  # what follows is often only shifted
 

@@ -15,10 +15,10 @@ from agents.base import Agent
 from agents.explain.responses import Response, responses_at
 from agents.explain.situations import SITUATIONS, situations_of
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env
 from leaderboard.scoring.names import EVENT_NAMES
-from leaderboard.scoring.rules import rules_named
 
 EVERY_S = 0.5  # between two moments that are looked at, unless told otherwise
 
@@ -144,6 +144,11 @@ def drive_responses(
         waypoints=_stacked(responses, "waypoints"),
         holds=np.array(holds, bool),
     )
+
+
+def plain_words(name: str) -> str:
+    """`stop sign` of `stop_sign`: a component or situation as people read it."""
+    return name.replace("_", " ")
 
 
 def drive_hash(record: RouteRecord) -> str:

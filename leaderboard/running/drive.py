@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from agents.base import Requirements
 from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
@@ -27,7 +28,7 @@ from leaderboard.running.interventions import sort_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.video import open_video
 from leaderboard.running.warm_up import warm_up
-from leaderboard.scoring.rules import rules_named
+from leaderboard.scoring.names import EVENT_NAMES
 
 Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
 
@@ -119,7 +120,7 @@ class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 def event_line(event: Event) -> str:
     """An event as a line: `  12.3 s  red light at (10.0, -4.5)`."""
-    name = event.kind.name.lower().replace("_", " ")
+    name = EVENT_NAMES[event.kind]
     metres = f", {event.value:.1f} m" if event.value else ""
     place = f"({event.x:.1f}, {event.y:.1f})"
     return escape(f"{event.tick * TICK_S:7.1f} s  {name}{metres} at {place}")

@@ -9,13 +9,13 @@ from typing import Any
 from agents import load_agent
 from agents.base import Agent, Requirements
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.episode import close_agent, drive_route
 from leaderboard.running.interventions import sort_interventions
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.timed_agent import TimedAgent
 from leaderboard.running.wall_clock import Doing, Stopwatch
-from leaderboard.scoring.rules import rules_named
 
 
 class Driver:

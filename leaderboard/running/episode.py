@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from agents.base import Agent, Requirements
+from di_envs.rules import Rules
 from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, WorldView
@@ -26,9 +27,9 @@ from leaderboard.records.record import (
     SIMULATION_CRASHED,
     RouteRecord,
 )
+from leaderboard.running.finished_route import lost_record, route_record
 from leaderboard.running.jobs import Job
-from leaderboard.running.log import EpisodeLog, lost_record, route_record
-from leaderboard.scoring.rules import Rules
+from leaderboard.running.log import EpisodeLog
 
 _LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
 _CONTROL_NAMES = ("throttle", "steer", "brake")

@@ -173,7 +173,7 @@ class _Evaluation:
 
 
 def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
-    from leaderboard.running.log import lost_record  # loads what only workers need
+    from leaderboard.running.finished_route import lost_record  # loads what only workers need
 
     return dataclasses.replace(lost_record(job, reason), status=status)
 

@@ -10,9 +10,9 @@ from di_envs.numerics.kernels import cpu_capability
 from leaderboard.records.versions import agent_hash, package_versions
 from leaderboard.running.driver import Driver, agent_requirements
 from leaderboard.running.episode import describe
+from leaderboard.running.finished_route import route_hash
 from leaderboard.running.interventions import check_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.log import route_hash
 from leaderboard.running.messages import Scene
 from leaderboard.running.wall_clock import Doing, Stopwatch
 

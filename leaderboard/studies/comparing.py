@@ -10,11 +10,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
 from leaderboard.records.footing import footing_differences, footing_of
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
-from leaderboard.scoring.rules import rules_named
-from leaderboard.statistics.bootstrap import DifferenceInterval, clustered_interval
+from leaderboard.statistics.bootstrap import BootstrapInterval, clustered_interval
 
 # Options of the environment that change what an agent sees or how often it decides, not the world
 _SEEN_ONLY = frozenset({"observations", "cameras", "lidar", "weather", "control_dt_s"})
@@ -83,7 +83,7 @@ class Comparison:
         """Number of distinct routes, by hash: what the interval's doubt rests on."""
         return len({pair.before.route_hash for pair in self.pairs})
 
-    def interval(self, score: str) -> DifferenceInterval:
+    def interval(self, score: str) -> BootstrapInterval:
         """The mean difference, second less first, of one of `SCORES`."""
         return clustered_interval(
             [getattr(p.after.score, score) - getattr(p.before.score, score) for p in self.pairs],

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from di_envs.config import check_name
-from leaderboard.studies.study_error import StudyError
+from leaderboard.studies import StudyError
 
 BASELINE, NULL = "baseline", "null"
 WAYS = ("drop", "zero")

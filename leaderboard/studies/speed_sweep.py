@@ -26,10 +26,12 @@ from leaderboard.records.results import read_run, replace_file
 from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.episode import close_agent
-from leaderboard.studies.effects import ALPHA, Effect, effect, interval
-from leaderboard.studies.experiments import Judgement, Verdict
+from leaderboard.statistics.bootstrap import expanded_interval
+from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
+from leaderboard.studies import StudyError
+from leaderboard.studies.effects import ALPHA, Effect, effect
+from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
-from leaderboard.studies.study_error import StudyError
 from wrappers.interventions.editing import ObservationEditing
 
 DOSES_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0)
@@ -223,16 +225,14 @@ def _curve(
         found = effect([drive[target][dose] for drive in drives], routes)
         ends: tuple[float | None, float | None] = (None, None)
         if found.means is not None:
-            ends = interval(found.means, found.routes, ALPHA / 2.0)
+            ends = expanded_interval(found.means, found.routes, ALPHA / 2.0)
         curve["mean"].append(found.mean)
         curve["low"].append(ends[0])
         curve["high"].append(ends[1])
     return curve
 
 
-def _verdict(gain: Effect) -> Verdict:
-    if gain.low is None or gain.high is None:
-        return Verdict.UNDECIDED
-    if gain.low > gain.margin:
-        return Verdict.HOLDS
-    return Verdict.DOES_NOT_HOLD if gain.high < gain.margin else Verdict.UNDECIDED
+def _verdict(gain: Effect) -> ClaimVerdict:
+    return verdict_of_interval(
+        gain.low, gain.high, holds_above=gain.margin, fails_below=gain.margin
+    )

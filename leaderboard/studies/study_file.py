@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from leaderboard.records.results import replace_file
-from leaderboard.studies.record import Drive, DrivenRow, Study
+from leaderboard.studies import StudyError
+from leaderboard.studies.record import DrivenRow, Study, StudyDrive
 from leaderboard.studies.rows import Row
-from leaderboard.studies.study_error import StudyError
 
 STUDY_FILE = "study.json"
 FORMAT, FORMAT_VERSION = "driveinsight-study", 1
-_DRIVE = tuple(part.name for part in dataclasses.fields(Drive))
+_DRIVE = tuple(part.name for part in dataclasses.fields(StudyDrive))
 
 
 def write_study(folder: Path, study: Study, findings: Mapping[str, Any] | None = None) -> None:
@@ -121,7 +121,7 @@ def _row_from_json(content: Mapping[str, Any], columns: tuple[str, ...]) -> Driv
     row = Row(**{part.name: content[part.name] for part in dataclasses.fields(Row)})
     drives = []
     for numbers in content["drives"]:
-        drive = Drive(**dict(zip(columns, numbers, strict=True)))
+        drive = StudyDrive(**dict(zip(columns, numbers, strict=True)))
         for name in ("driving_score", "route_completion", "infraction_score", "wall_s", "done_m"):
             if not isinstance(getattr(drive, name), int | float):
                 raise TypeError(f"{name} of a drive is no number: {getattr(drive, name)!r}")

@@ -7,6 +7,7 @@ from typing import Any
 
 from gymnasium.wrappers import TimeLimit
 
+from di_envs.rules import rules_named
 from di_envs.suites import load_suite
 from leaderboard.records.record import RunRecord
 from leaderboard.running.episode import drive_route
@@ -14,7 +15,6 @@ from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.runner import new_run
 from leaderboard.running.setting_up import scene_of, set_up
 from leaderboard.running.wall_clock import Stopwatch
-from leaderboard.scoring.rules import rules_named
 
 
 def short_run(

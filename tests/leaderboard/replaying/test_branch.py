@@ -167,5 +167,5 @@ def test_the_tables_tell_which_events_are_only_in_one_future(run, hit):
     futures = branch(run, run.routes[0], 3.0, read_world_edits(f"remove:actor={hit.other}"))
     _, events = branch_tables(futures)
     cells = [list(column.cells) for column in events.columns]
-    row = next(i for i, cell in enumerate(cells[1]) if "collision vehicle" in cell)
+    row = next(i for i, cell in enumerate(cells[1]) if "vehicle hit" in cell)
     assert cells[2][row] == ""

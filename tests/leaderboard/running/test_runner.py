@@ -15,6 +15,7 @@ import pytest
 from rich.console import Console
 
 from di_envs.numerics.kernels import cpu_capability
+from di_envs.rules import CARLA_1_0
 from di_envs.suites import load_suite
 from leaderboard.records.record import (
     AGENT_CRASHED,
@@ -31,7 +32,6 @@ from leaderboard.running.messages import Lost
 from leaderboard.running.runner import evaluate
 from leaderboard.running.wall_clock import Limits
 from leaderboard.running.workers.local_engine import LocalEngine
-from leaderboard.scoring.rules import CARLA_1_0
 
 MISBEHAVING = Path(__file__).parents[1] / "misbehaving.py"
 TOY = load_suite("toy")

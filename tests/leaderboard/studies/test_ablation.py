@@ -9,10 +9,11 @@ from PIL import Image
 from rich.console import Console
 
 from leaderboard.pages.study_files import keep_study, write_ablation
-from leaderboard.studies.ablation import findings, sentences, work_out
+from leaderboard.studies import StudyError
+from leaderboard.studies.ablation import work_out
+from leaderboard.studies.ablation_findings import findings, sentences
 from leaderboard.studies.effects import EQUIVALENT, MATTERS
 from leaderboard.studies.rows import ABLATION_ROWS, choose_rows
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, read_study
 from leaderboard.studies.table_two import TABLE_2
 from leaderboard.tables.ablation_table import ablation_markdown, ablation_tables

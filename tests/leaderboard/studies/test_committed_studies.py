@@ -15,7 +15,7 @@ from leaderboard.replaying.verify import verify_route
 from leaderboard.studies.ablation import work_out
 from leaderboard.studies.approaches import GREEN_SHOWN, approaches
 from leaderboard.studies.prompt_editing import finding_sentence, judgements_of
-from leaderboard.studies.record import Drive
+from leaderboard.studies.record import StudyDrive
 from leaderboard.studies.rows import BASELINE, NULL
 from leaderboard.studies.study_file import read_study
 from leaderboard.tables.ablation_table import ablation_markdown
@@ -40,7 +40,7 @@ def test_there_are_an_ablation_and_a_study_of_prompt_editing():
 def test_every_drive_of_the_study_is_one_of_its_runs(folder):
     for driven in read_study(folder).rows:
         run = read_run(folder / "rows" / driven.row.name)
-        assert driven.drives == tuple(Drive.of(record) for record in run.scored)
+        assert driven.drives == tuple(StudyDrive.of(record) for record in run.scored)
         assert len(run.scored) == run.planned == driven.planned
 
 

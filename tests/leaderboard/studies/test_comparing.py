@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from di_envs.rules import CARLA_2_1
 from di_envs.world.kinds import EventKind
 from leaderboard.commands.cli import main
 from leaderboard.records.rescoring import rescored
 from leaderboard.records.results import write_run
-from leaderboard.scoring.rules import CARLA_2_1
 from leaderboard.scoring.score import Score
 from leaderboard.studies.comparing import PairingError, compare_runs
 from leaderboard.tables.comparison_table import comparison_tables
@@ -48,9 +48,9 @@ def text_of(comparison) -> str:
 
 def test_the_mean_difference_is_second_less_first_over_pairs():
     comparison = compare_runs(*runs())
-    assert comparison.interval("driving_score").mean == pytest.approx((30.0 + 0.0 + 50.0) / 3)
-    assert comparison.interval("route_completion").mean == pytest.approx(50.0 / 3)
-    assert comparison.interval("infraction_score").mean == pytest.approx(0.1)
+    assert comparison.interval("driving_score").value == pytest.approx((30.0 + 0.0 + 50.0) / 3)
+    assert comparison.interval("route_completion").value == pytest.approx(50.0 / 3)
+    assert comparison.interval("infraction_score").value == pytest.approx(0.1)
 
 
 def test_which_routes_changed_and_by_which_event_is_named():
@@ -91,7 +91,7 @@ def test_a_run_compared_with_itself_has_no_difference():
     before, _ = runs()
     comparison = compare_runs(before, before)
     interval = comparison.interval("driving_score")
-    assert (interval.mean, interval.low, interval.high) == (0.0, 0.0, 0.0)
+    assert (interval.value, interval.low, interval.high) == (0.0, 0.0, 0.0)
     assert comparison.changes() == []
 
 

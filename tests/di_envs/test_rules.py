@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from di_envs.config import RULES as ENVIRONMENT_RULES
-from di_envs.penalties import Form, Penalties
-from di_envs.world.kinds import EventKind
-from leaderboard.scoring.rules import (
+import di_envs.rules as rules_package
+from di_envs.config import RouteEnvConfig
+from di_envs.rules import (
     CARLA_1_0,
     CARLA_2_0,
     CARLA_2_1,
     RULES,
-    Layout,
     Rules,
     rules_named,
 )
+from di_envs.rules.penalties import Form, Penalties
+from di_envs.rules.rule_set import Layout
+from di_envs.world.kinds import EventKind
 
 FACTORS = {
     EventKind.COLLISION_WALKER: 0.5,
@@ -99,8 +102,16 @@ def test_a_typo_in_the_rules_name_is_answered_with_the_right_one():
         rules_named("carla-1.O")
 
 
-def test_the_environment_knows_the_same_rules_as_the_leaderboard():
-    assert set(ENVIRONMENT_RULES) == set(RULES)
+def test_the_environment_takes_every_rule_set_by_name_and_answers_a_typo():
+    for name in RULES:
+        assert RouteEnvConfig(suite="town05_tiny", rules=name).rules == name
+    with pytest.raises(ValueError, match=r"did you mean 'carla-2\.1'\? known: .*carla-1\.0"):
+        RouteEnvConfig(suite="town05_tiny", rules="carla-2.l")
+
+
+def test_each_rule_set_has_a_file_of_its_own():
+    files = {path.stem for path in Path(rules_package.__file__).parent.glob("carla_*.py")}
+    assert files == {name.replace("-", "_").replace(".", "_") for name in RULES}
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,18 @@
-"""Rules of a benchmark as named data: what an event costs, and what a route's ending is called.
+"""What a rule set is: what each event costs, which ends a route, and what the ending is called.
 
-A change that can move a score is a new name in `RULES`, never an edit of an old one.
-Source: CARLA Leaderboard, branches `leaderboard-1.0`, `-2.0` and `-2.1` (penalties, statuses).
+Source: CARLA Leaderboard, branches `leaderboard-1.0`, `-2.0` and `-2.1` (statuses, order).
 """
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import ClassVar
 
-from di_envs.penalties import PENALTIES, Penalties
+from di_envs.rules.penalties import Penalties
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 
 PERFECT = "Perfect"  # what 2.x calls a route completed without an infraction
@@ -78,7 +77,7 @@ class Rules:
             ValueError: If it is neither scored, nor an ending, nor ignored.
         """
         if kind not in self.ignored and kind not in self.scored and kind not in self.endings:
-            name = kind.name.lower() if isinstance(kind, EventKind) else repr(kind)
+            name = EVENT_KEYS[kind] if isinstance(kind, EventKind) else repr(kind)
             raise ValueError(
                 f"the rules {self.name} do not say what the event {name} costs: score it by the "
                 "program that recorded it"
@@ -110,39 +109,3 @@ _LISTED = (
     EventKind.BLOCKED,
     EventKind.MIN_SPEED,
 )
-
-CARLA_1_0 = Rules(
-    name="carla-1.0",
-    penalties=PENALTIES["carla-1.0"],
-    layout=Layout.V1,
-    ignored=frozenset({EventKind.SCENARIO, EventKind.MIN_SPEED}),
-)
-CARLA_2_0 = Rules(
-    name="carla-2.0",
-    penalties=PENALTIES["carla-2.0"],
-    layout=Layout.V2,
-    completion_decimals=2,
-)
-CARLA_2_1 = Rules(
-    name="carla-2.1",
-    penalties=PENALTIES["carla-2.1"],
-    layout=Layout.V2,
-    completion_decimals=2,
-)
-
-RULES: Mapping[str, Rules] = MappingProxyType(
-    {rules.name: rules for rules in (CARLA_1_0, CARLA_2_0, CARLA_2_1)}
-)
-
-
-def rules_named(name: str) -> Rules:
-    """The rules of that name.
-
-    Raises:
-        ValueError: If there are none; the message lists those there are.
-    """
-    if name not in RULES:
-        near = difflib.get_close_matches(name, RULES, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"unknown rules '{name}'; {hint}known: {', '.join(RULES)}")
-    return RULES[name]

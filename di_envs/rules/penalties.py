@@ -1,11 +1,6 @@
-"""What infractions cost under each rule set, as data, and the infraction score that they make.
+"""What infractions cost, and the infraction score that they make: one arithmetic for all rule sets.
 
-The reward and the leaderboard's score go by the same table and the same arithmetic. A change that
-can move a score is a new name, never an edit of an old one. `docs/rules.md` says where the numbers
-are from and what CARLA's own code does besides.
-
-Source: CARLA Leaderboard, statistics managers of the branches `leaderboard-1.0`, `leaderboard-2.0`
-and `leaderboard-2.1` (numbers; written anew).
+The reward and the leaderboard's score go by it alike. The numbers stand in the rule sets' files.
 """
 
 from __future__ import annotations
@@ -17,6 +12,7 @@ from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
 
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 
 
@@ -61,7 +57,7 @@ class Penalties:
     @cached_property
     def no_terms(self) -> Mapping[str, float]:
         """What the scored kinds take of a step without an infraction, by name: nothing."""
-        return MappingProxyType({kind.name.lower(): 0.0 for kind in self.scored})
+        return MappingProxyType({EVENT_KEYS[kind]: 0.0 for kind in self.scored})
 
     def infraction_score(
         self,
@@ -91,41 +87,3 @@ class Penalties:
             total = math.fsum(costs + [self.min_speed * part for part in slow])
         # multiplied in order of size: no order of events can change a bit
         return math.prod(sorted(factors)) / (1.0 + total)
-
-
-PENALTIES: Mapping[str, Penalties] = MappingProxyType(
-    {
-        "carla-1.0": Penalties(
-            form=Form.PRODUCT,
-            costs={
-                EventKind.COLLISION_WALKER: 0.50,
-                EventKind.COLLISION_VEHICLE: 0.60,
-                EventKind.COLLISION_STATIC: 0.65,
-                EventKind.RED_LIGHT: 0.70,
-                EventKind.STOP_SIGN: 0.80,
-            },
-        ),
-        "carla-2.0": Penalties(
-            form=Form.PRODUCT,
-            costs={
-                EventKind.COLLISION_WALKER: 0.50,
-                EventKind.COLLISION_VEHICLE: 0.60,
-                EventKind.COLLISION_STATIC: 0.65,
-                EventKind.RED_LIGHT: 0.70,
-                EventKind.STOP_SIGN: 0.80,
-            },
-            min_speed=0.30,
-        ),
-        "carla-2.1": Penalties(
-            form=Form.SUM,
-            costs={
-                EventKind.COLLISION_WALKER: 1.00,
-                EventKind.COLLISION_VEHICLE: 0.70,
-                EventKind.COLLISION_STATIC: 0.60,
-                EventKind.RED_LIGHT: 0.40,
-                EventKind.STOP_SIGN: 0.25,
-            },
-            min_speed=0.40,
-        ),
-    }
-)
