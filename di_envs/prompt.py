@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The structured prompt: what a driver is told about the world, as fixed-size arrays.
 
 Nine components, each of which tells only its own story: the map, the obstacles, the lights and the

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What truly lies in each BEV cell: the teacher of the BEV features.
 
 Road and lines come from the ground that cameras see, so the teacher never names what is not shown.

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Angles, frames and boxes, as scalar kernels.
 
 World frame: x east, y south, z up, yaw clockwise from x towards y. Ego frame: x ahead, y right.

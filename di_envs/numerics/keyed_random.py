@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Keyed randomness: each draw is a hash of what it is for, so no draw depends on another.
 
 Removing an actor, adding a sensor or skipping a draw then changes nobody else's numbers.

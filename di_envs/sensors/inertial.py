@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """IMU and GNSS as CARLA's Leaderboard mounts them, with its noise, as functions of the state.
 
 Source: noise as set by the Leaderboard's agent wrapper; compass and axes as in CARLA's IMU sensor

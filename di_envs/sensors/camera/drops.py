@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What is drawn over a finished image: the glow of lamps, and rain."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How boxes and the sky look, a span of one row of pixels of one face at a time."""
 
 from __future__ import annotations

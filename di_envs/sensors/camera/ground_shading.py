@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How the ground looks, a span of one row of pixels at a time: its raster, shadows, wet and haze.
 
 Without roll a row of the ground plane lies at one depth, so its texels lie on a line.

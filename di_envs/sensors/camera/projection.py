@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Boxes as a camera sees them: the pixels they may cover, their rays, the light on their faces."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Reading rasters of the ground, a span of pixels at a time.
 
 A bilinear sample is made in three passes, as the first and the last are pure arithmetic, which LLVM

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One camera's images, row by row: what each pixel shows, then its colour in runs of one face.
 
 Boxes are tested only on the spans of the rows that they may cover.

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The innermost loops of the cameras: small functions over slices of one row of pixels.
 
 Each works on contiguous single-precision slices from 0 on and calls nothing, which is what lets

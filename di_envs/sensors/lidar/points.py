@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What a LiDAR hands out for its rays: points, intensities, dropped rays, noise, tags."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How far each ray of a LiDAR goes, and what it meets: the ground plane, then box by box.
 
 Each channel meets the plane at a distance known beforehand. Along a step an upright box is a pair

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """LiDAR: a sweep of rays against the same scene that cameras show.
 
 A LiDAR turns ten times a second. An observer that looks at every world tick, twice a turn, gets

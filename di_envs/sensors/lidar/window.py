@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Which steps and channels of a LiDAR may meet a box, so that only those rays are tested."""
 
 from __future__ import annotations

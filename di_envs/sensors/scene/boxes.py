@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Boxes: what stands on the ground, as arrays that cameras and LiDAR read alike.
 
 A box is turned by its yaw and then tilted by its pitch (positive lifts its front, for decks of

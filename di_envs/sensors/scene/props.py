@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What stands beside the road for good: buildings, trees, lamp posts, decks, rails, pillars.
 
 Places are drawn by key on grids over the town and kept where the ground raster has nothing but

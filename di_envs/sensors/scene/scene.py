@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The scene: what stands where, for cameras and LiDAR alike, so that they never disagree.
 
 `scene_of(town)` builds what never moves: rasters of the ground, and static boxes with a grid that

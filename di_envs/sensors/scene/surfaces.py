@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The ground as a raster of colours and tags: lanes, lines, stop lines, crosswalks, grass.
 
 Two rasters make a town: one for what lies on its plane, one for what is elevated (the tops of

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What actors look like: each kind of vehicle, walker and prop as a handful of boxes.
 
 A part's place and size are shares of the actor's own box (half length, half width, height), so one
