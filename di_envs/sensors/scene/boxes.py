@@ -84,7 +84,7 @@ def boxes_of(specs: Sequence[BoxSpec]) -> Boxes:
 
 
 @kernel
-def copy_box(source, row, target):
+def copy_box(source: Boxes, row: int, target: Boxes) -> None:
     """Appends a box to others; one that finds no room is left out."""
     at = target.count[0]
     if at >= target.yaw.shape[0]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from di_envs.sensors.scene.boxes import Material
+from di_envs.sensors.scene.raster import TEXEL_M
 from di_envs.sensors.scene.scene import ROOM, box_buffer, build_scene, collect_boxes, scene_of
-from di_envs.sensors.scene.surfaces import TEXEL_M
 from di_envs.sensors.scene.tags import PALETTE, Tag
 from di_envs.town.lanes import LaneKind, LightState
 from di_envs.town.loading import load_town

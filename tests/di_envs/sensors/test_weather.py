@@ -47,8 +47,8 @@ def test_every_look_is_finite_and_within_what_an_image_can_show(name):
 
 
 def test_more_fog_hides_more_and_more_cloud_takes_the_shadows():
-    assert look_of(Weather(fog=60)).numbers[0] > 3 * look_of(Weather(fog=5)).numbers[0]
-    assert look_of(Weather(cloudiness=90)).numbers[1] < look_of(Weather()).numbers[1] / 2
+    assert look_of(Weather(fog=60)).haze > 3 * look_of(Weather(fog=5)).haze
+    assert look_of(Weather(cloudiness=90)).shadow < look_of(Weather()).shadow / 2
 
 
 def test_the_night_is_darker_than_the_day():
