@@ -13,12 +13,8 @@ from di_envs.sensors.camera.canvas import Canvas, Studio
 from di_envs.sensors.camera.drops import add_glow, add_rain
 from di_envs.sensors.camera.face_shading import colour_face, colour_sky
 from di_envs.sensors.camera.ground_shading import colour_ground, shade_row
-from di_envs.sensors.camera.projection import (
-    Projected,
-    place_camera,
-    project_boxes,
-    project_shadows,
-)
+from di_envs.sensors.camera.projection import Projected, place_camera, project_boxes
+from di_envs.sensors.camera.shadows import project_shadows
 from di_envs.sensors.camera.spans import (
     BoxRays,
     beam_span,
