@@ -15,7 +15,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from di_envs.config import RouteEnvConfig, check_name
-from di_envs.observation import Observer, observation_space
+from di_envs.observation import observation_space
+from di_envs.observer import Observer
 from di_envs.reward import (
     Standing,
     infraction_penalty,

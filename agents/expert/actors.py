@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Everybody else, seen from the expert's path: leaders and gaps, as kernels."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Steering along the path, as a kernel.
 
 It inverts the ego's own model (`di_envs.world.dynamics`), so little is left to feedback.

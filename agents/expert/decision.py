@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One decision of the expert, as a kernel: where am I, may I change lanes, how fast, which way."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Junctions: enter only with room behind, and never into the way of those who cross, as kernels."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Where the expert is on its path, and where the path lies, lane changes included, as kernels."""
 
 from __future__ import annotations

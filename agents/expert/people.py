@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """People, seen from the expert's path: those who cross it, and those who may step out, as kernels.
 
 A cyclist who crosses the road off all lanes is taken for somebody on foot, only faster.

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Stop lines: red and yellow lights, and stop signs, as kernels."""
 
 from __future__ import annotations

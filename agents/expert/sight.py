@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What the expert's looking round comes to: a few numbers, and who may cross a junction."""
 
 from __future__ import annotations

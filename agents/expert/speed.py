@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Accelerations that keep a speed, a gap or a stop, and a forecast of arrivals, as kernels."""
 
 from __future__ import annotations

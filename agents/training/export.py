@@ -35,7 +35,7 @@ from agents.training.variation import FOURTEEN_WEATHERS
 from agents.training.waypoints import expert_waypoints
 from di_envs.config import check_name
 from di_envs.numerics.keyed_random import Stream, uniform
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.prompt import COMPONENTS
 from di_envs.sensors.camera.config import rig_of
 from di_envs.sensors.lidar.config import lidar_of

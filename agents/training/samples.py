@@ -27,7 +27,7 @@ from agents.training.frames import Drive, DriveStage
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
 from di_envs.numerics.keyed_random import Stream, uniform
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town

@@ -29,7 +29,7 @@ from di_envs.drawing.outlines import (
     stop_line_ends,
 )
 from di_envs.drawing.prompt_text import prompt_in_words
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.reward import standing_of
 from di_envs.world.event_names import EVENT_NAMES, event_of_key
 from di_envs.world.kinds import ActorKind, EventKind

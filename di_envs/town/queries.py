@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Kernels that find poses and lanes in a town: all know height, so a bridge is not the road below.
 
 World frame; stations are metres along a lane in its direction of travel; lateral offsets are

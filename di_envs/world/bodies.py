@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Boxes of actors: how they overlap, and what the event rules read of an ego."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What happens when an ego's body meets another: nobody passes through, and no energy is made.
 
 A contact is a perfectly inelastic impact of two point masses along the contact normal; each body

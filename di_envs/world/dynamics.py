@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How an ego moves under throttle, brake and steering: a bicycle fitted to CARLA's Lincoln."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Traffic lights: the arms of a junction take turns, one group at a time, the rest stay red.
 
 While a scenario plays with a junction's lights its turns stand still; then they go on.

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One tick of a world: the order in which everything moves."""
 
 from __future__ import annotations

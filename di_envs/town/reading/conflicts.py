@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Where the lanes of a junction come so close that two vehicles cannot pass at once."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Which contacts of an ego count as collisions: the de-duplication of Leaderboard 1.0."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Driving outside lanes or against them, by Leaderboard 1.0: metres now, one event at the end."""
 
 from __future__ import annotations

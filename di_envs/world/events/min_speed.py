@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Driving slower than the traffic around, by Leaderboard 2.x: an event at a failed checkpoint.
 
 A route has four checkpoints, a quarter of its length apart. Since the last one, the ego's mean

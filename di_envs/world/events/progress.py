@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How far along its route an ego has come, by Leaderboard 1.0's route completion test."""
 
 from __future__ import annotations

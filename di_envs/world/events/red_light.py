@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Running a red light, by Leaderboard 1.0: the fine comes when the tail crosses the stop line."""
 
 from __future__ import annotations

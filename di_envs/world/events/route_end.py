@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What ends a route in Leaderboard 1.0: completion, deviation, being blocked, the timeout."""
 
 from __future__ import annotations

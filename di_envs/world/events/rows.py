@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The rows in which kernels report events, so that a tick allocates nothing."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Running a stop sign, by Leaderboard 1.0, with its traps.
 
 A sign is watched once its trigger box lies on the lane ahead. The fine comes when the box is no

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """All events of CARLA Leaderboard 1.0 for one ego and tick, each by the rule of its own module.
 
 Source: CARLA leaderboard and scenario_runner, branches `leaderboard-1.0`, of which the geometry,

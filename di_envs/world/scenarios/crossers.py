@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Scenarios 3 and 4: somebody crosses right before the ego, from behind something or after a turn.
 
 He waits beside the road until the ego is near, then goes straight across to the far side and is

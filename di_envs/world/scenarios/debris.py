@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Scenario 1, control loss: debris on the road, over which steering and throttle are disturbed.
 
 Three patches lie 14, 48 and 74 m ahead, flat: one drives over them. While the ego is within 2 m of

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Scenarios 7, 8 and 9 at junctions with lights: another arm gets green with the ego's.
 
 The ego's arm is green and all others red until the ego is 10 m before the junction; then it is

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The Leaderboard's scenarios 1, 3, 4, 7, 8, 9 and 10: what triggers them, and who acts each tick.
 
 Each trigger of an ego's plan has a small state machine (`State.scenario_step`), run once; those of

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What the state machines of all scenarios share: their first and last step, and their actors."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What a vehicle meets at the end of its lane: the way ahead, the line, the light or the sign."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How a driver keeps behind another: the Intelligent Driver Model, and what is safe besides.
 
 Source: Intelligent Driver Model (Treiber, Hennecke, Helbing: Congested traffic states in empirical

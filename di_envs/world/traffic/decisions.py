@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Traffic's decisions: whom a vehicle follows, how fast its road lets it go, where it must stop."""
 
 from __future__ import annotations

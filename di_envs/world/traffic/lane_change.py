@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Lane changes of traffic: MOBIL, with highway-env's parameters.
 
 Source: Kesting, Treiber, Helbing: General lane-changing model MOBIL for car-following models,

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How vehicles move along their lanes: drawn ways, lane changes under way, axles on the lane."""
 
 from __future__ import annotations

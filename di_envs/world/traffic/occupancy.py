@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Who is where on the lanes: per tick, each lane's bodies in order, and the search for a leader.
 
 A body lies on every lane that it overlaps: its own, the one its tail has not left, the one a lane

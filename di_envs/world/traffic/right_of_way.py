@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Who may enter a junction: a vehicle goes in only with a grant for its way through.
 
 A grant is given when the light is green or the stop has been made, when nobody who holds a grant

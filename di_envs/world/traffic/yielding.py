@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Who is in the way of a vehicle that would enter a junction: grants of others, egos, a jam."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """When a walker may step onto a crosswalk, and what stops one who is on it."""
 
 from __future__ import annotations

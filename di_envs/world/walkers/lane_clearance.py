@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How far places are from the driving lanes, which is what keeps walkers out of the traffic."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Walkers keep out of each other's way: nobody steps into another."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Walkers stroll along sidewalks at their own pace, and cross where it is safe.
 
 Each follows the edges of the walking graph, to the right of their lines, and takes a keyed choice

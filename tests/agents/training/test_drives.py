@@ -21,7 +21,7 @@ from agents.training.collect import (
 from agents.training.frames import DriveFileError, DriveLog, DriveStage, read_drive, write_drive
 from agents.training.towns import town_files
 from agents.training.waypoints import expert_waypoints
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.route_env import RouteEnv
 
 SAME = "agents.expert.agent:Expert"  # under another name: a learner that needs no correction

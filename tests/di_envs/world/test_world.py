@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
