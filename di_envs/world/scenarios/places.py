@@ -73,9 +73,7 @@ def find_kerb(town: Town, lane: int, station_m: float) -> Kerb:
     width = float(width_at(lanes, lane, station_m))
     aside = 0.5 * width + BESIDE_M
     at = x - aside * math.sin(yaw), y + aside * math.cos(yaw)
-    beside, there, lateral, away = nearest_lane(
-        lanes, at[0], at[1], z, BESIDE_M, np.int64(_PARKING_MASK)
-    )
+    beside, there, lateral, away = nearest_lane(lanes, at[0], at[1], z, BESIDE_M, _PARKING_MASK)
     if beside >= 0 and away - abs(lateral) < ABREAST_M:
         broad = float(width_at(lanes, beside, there))
         if broad > PARKING_WIDTH_M - 0.05 or lanes.kind[beside] == LaneKind.PARKING:
