@@ -11,7 +11,8 @@ from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes
-from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
+from di_envs.town.lanes_below import lanes_below_box
+from di_envs.town.queries import DRIVING_MASK, nearest_lane, pose_at
 from di_envs.world.state import HISTORY_LENGTH, TICK_S, State
 
 LOOK_M = 40.0  # for a lane; an ego this far from all of them has left its route too

@@ -14,7 +14,8 @@ import math
 from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, Signals
-from di_envs.town.queries import lanes_below_box, project_to_lane
+from di_envs.town.lanes_below import lanes_below_box
+from di_envs.town.queries import project_to_lane
 from di_envs.world.bodies import LARGEST_M, SAME_LEVEL_M, Box, box_of, overlap
 from di_envs.world.contact import DOWN
 from di_envs.world.scenarios.steps import draw_of, end_scenario, go_to, put_actor

@@ -14,9 +14,9 @@ import numpy as np
 
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.town.lanes import LaneKind, SignalKind
+from di_envs.town.lanes_below import lanes_below_box
 from di_envs.town.plan import RoutePlan
 from di_envs.town.queries import (
-    lanes_below_box,
     nearest_lane,
     pose_at,
     project_to_lane,

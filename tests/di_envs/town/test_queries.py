@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from di_envs.town.lanes import LaneKind
+from di_envs.town.lanes_below import lanes_below_box
 from di_envs.town.queries import (
     DRIVING_MASK,
-    lanes_below_box,
     nearest_driving_lane_towards,
     nearest_lane,
     pose_at,
