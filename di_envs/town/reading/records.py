@@ -66,7 +66,6 @@ class SignalRecord:
     s: float
     t: float
     z_offset: float
-    h_offset: float
     orientation: str  # "+", "-" or "none"
     validity: tuple[tuple[int, int], ...]  # (from lane, to lane)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from agents.expert.path import STEP_M
+from agents.expert.base_line import STEP_M
+from agents.expert.path import DrivePath
 from di_envs.numerics.kernels import kernel
 
 
@@ -22,7 +23,7 @@ class Progress(NamedTuple):
 
 
 @kernel
-def shift_at(path, progress, station_m):
+def shift_at(path: DrivePath, progress: Progress, station_m: float) -> tuple[float, float, float]:
     """Offset of the path from the base line [m, positive right], and its first two derivatives."""
     value, slope, bend = 0.0, 0.0, 0.0
     for k in range(max(progress.changes - 1, 0), path.change_jump_m.size):
@@ -44,15 +45,18 @@ def shift_at(path, progress, station_m):
 
 
 @kernel
-def _point(path, progress, index):
+def _point(path: DrivePath, progress: Progress, index: int) -> tuple[float, float]:
+    """x, y of the path at a base point, shifted where a lane change is not yet made."""
     shift, _, _ = shift_at(path, progress, index * STEP_M)
     yaw = path.yaw[index]
     return path.x[index] - shift * math.sin(yaw), path.y[index] + shift * math.cos(yaw)
 
 
 @kernel
-def pose_at(path, progress, station_m):
-    """x, y, yaw and curvature of the path at a station; straight on before its start."""
+def pose_at(
+    path: DrivePath, progress: Progress, station_m: float
+) -> tuple[float, float, float, float]:
+    """(x, y, yaw, curvature [1/m]) of the path at a station; straight on before its start."""
     last = path.x.size - 2
     index = min(max(int(station_m / STEP_M), 0), last)
     share = station_m / STEP_M - index
@@ -69,20 +73,20 @@ def pose_at(path, progress, station_m):
 
 
 @kernel
-def speed_at(path, station_m):
-    """Target speed of the path at a station."""
+def speed_at(path: DrivePath, station_m: float) -> float:
+    """Target speed [m/s] of the path at a station."""
     index = min(max(int(station_m / STEP_M), 0), path.x.size - 1)
     return path.speed_mps[index]
 
 
 @kernel
-def height_at(path, station_m):
-    """Height of the path at a station."""
+def height_at(path: DrivePath, station_m: float) -> float:
+    """Height [m] of the path at a station, world frame."""
     return path.z[min(max(int(station_m / STEP_M), 0), path.x.size - 1)]
 
 
 @kernel
-def nearest_index(path, x, y, begin, end, stride):
+def nearest_index(path: DrivePath, x: float, y: float, begin: int, end: int, stride: int) -> int:
     """The path's base point nearest to a place, among every `stride`-th of [begin, end)."""
     best, found = math.inf, begin
     for index in range(begin, end, stride):
@@ -94,7 +98,9 @@ def nearest_index(path, x, y, begin, end, stride):
 
 
 @kernel
-def project(path, progress, x, y, begin, end):
+def project(
+    path: DrivePath, progress: Progress, x: float, y: float, begin: int, end: int
+) -> tuple[float, float, float]:
     """Station and offset of a place from the path, searched among base points [begin, end).
 
     Returns:
@@ -112,8 +118,12 @@ def project(path, progress, x, y, begin, end):
 
 
 @kernel
-def localise(path, progress, x, y):
-    """The station nearest to the car, near the last one: a path may cross itself."""
+def localise(path: DrivePath, progress: Progress, x: float, y: float) -> tuple[float, float, float]:
+    """The station nearest to the car, near the last one: a path may cross itself.
+
+    Returns:
+        As of `project`.
+    """
     index = int(progress.station_m / STEP_M)
     begin = max(index - 8, 0)
     end = min(index + 24, path.x.size)

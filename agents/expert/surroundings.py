@@ -5,60 +5,57 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.town.lanes import Lanes, Signals
 from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
 from di_envs.world.state import State
 
 LASTING_TICKS = 100_000  # for which a green that somebody forces is taken to last
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
-
 
 class Actors(NamedTuple):
     """The actors (A,), as in `State`."""
 
-    kind: NDArray[np.int8]
-    x: Float
-    y: Float
-    z: Float
-    yaw: Float
-    speed: Float
-    half_length: Float
-    half_width: Float
-    lane: Int
-    lane_m: Float
-    lateral_m: Float
-    path: Int  # (A, PATH_LANES)
-    previous_lane: Int
-    changing_from: Int
-    grant: Int
-    walk_edge: Int
+    kind: Int8
+    x: Float64
+    y: Float64
+    z: Float64
+    yaw: Float64
+    speed: Float64
+    half_length: Float64
+    half_width: Float64
+    lane: Int32
+    lane_m: Float64
+    lateral_m: Float64
+    path: Int32  # (A, PATH_LANES)
+    previous_lane: Int32
+    changing_from: Int32
+    grant: Int32
+    walk_edge: Int32
 
 
 class Ways(NamedTuple):
     """The lanes' lengths, junctions and meeting places, as in `Lanes`."""
 
-    junction: Int
-    length_m: Float
-    predecessor_start: Int
-    predecessor: Int
-    conflict_start: Int
-    conflict_lane: Int
-    conflict_begin_m: Float
-    conflict_end_m: Float
-    conflict_other_begin_m: Float
-    conflict_other_end_m: Float
+    junction: Int32
+    length_m: Float64
+    predecessor_start: Int32
+    predecessor: Int32
+    conflict_start: Int32
+    conflict_lane: Int32
+    conflict_begin_m: Float64
+    conflict_end_m: Float64
+    conflict_other_begin_m: Float64
+    conflict_other_end_m: Float64
 
 
 class Lights(NamedTuple):
     """What lights show (S,), and since when their junctions' turns run (J,)."""
 
-    light: NDArray[np.int8]
-    junction: Int
-    phase_ticks: Int
+    light: Int8
+    junction: Int32
+    phase_ticks: Int32
 
 
 def actors_of(state: State) -> Actors:

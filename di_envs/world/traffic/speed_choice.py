@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Int8
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
-from di_envs.world.state import PATH_LANES, ActorKind
-from di_envs.world.traffic.approach import STOP_ZONE_M
+from di_envs.town.lanes import Lanes
+from di_envs.world.state import PATH_LANES, ActorKind, State
+from di_envs.world.traffic.approach import STOP_ZONE_M, Requests
 from di_envs.world.traffic.car_following import (
     ACCELERATION_MPS2,
     CAR_LENGTH_M,
@@ -22,8 +24,8 @@ from di_envs.world.traffic.car_following import (
     idm_acceleration,
     safe_speed,
 )
-from di_envs.world.traffic.occupancy import find_leader
-from di_envs.world.traffic.tables import SLOWING_MPS2
+from di_envs.world.traffic.occupancy import Occupancy, find_leader
+from di_envs.world.traffic.tables import SLOWING_MPS2, TrafficTables
 
 LINE_GAP_M = 0.8  # at which vehicles stop before a line
 SAFE_GAP_M = 0.4
@@ -50,7 +52,15 @@ def make_leaders(actors: int) -> Leaders:
 
 
 @kernel
-def find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end):
+def find_leaders(
+    leaders: Leaders,
+    occupancy: Occupancy,
+    state: State,
+    lanes: Lanes,
+    tables: TrafficTables,
+    egos: int,
+    vehicle_end: int,
+) -> None:
     """Finds the body ahead of each vehicle, on both lanes while it changes lanes."""
     for actor in range(egos, vehicle_end):
         if state.kind[actor] == _ABSENT:
@@ -76,7 +86,10 @@ def find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end):
 
 
 @kernel
-def _leader_on_old_lane(leaders, occupancy, state, lanes, actor):
+def _leader_on_old_lane(
+    leaders: Leaders, occupancy: Occupancy, state: State, lanes: Lanes, actor: int
+) -> None:
+    """Follows the body ahead on the lane that a change leaves, if it is nearer."""
     lane = state.changing_from[actor]
     s = state.lane_m[actor] * lanes.length_m[lane] / lanes.length_m[state.lane[actor]]
     body = occupancy.first[lane]
@@ -93,7 +106,7 @@ def _leader_on_old_lane(leaders, occupancy, state, lanes, actor):
 
 
 @kernel
-def allowed_speed(state, lanes, tables, actor):
+def allowed_speed(state: State, lanes: Lanes, tables: TrafficTables, actor: int) -> float:
     """Speed that limits and bends allow here, slowing in time for the lanes ahead [m/s]."""
     lane = state.lane[actor]
     index = int(state.lane_m[actor] / lanes.spacing_m[lane] + 0.5)
@@ -111,7 +124,9 @@ def allowed_speed(state, lanes, tables, actor):
 
 
 @kernel
-def _busy_crosswalk_gap(state, lanes, tables, busy, actor):
+def _busy_crosswalk_gap(
+    state: State, lanes: Lanes, tables: TrafficTables, busy: Int8, actor: int
+) -> float:
     """Distance from the front to the first crosswalk ahead that somebody walks on."""
     front = state.lane_m[actor] + state.half_length[actor]
     offset = -front
@@ -128,7 +143,16 @@ def _busy_crosswalk_gap(state, lanes, tables, busy, actor):
 
 
 @kernel
-def choose_speed(state, lanes, tables, leaders, requests, busy, egos, actor):
+def choose_speed(
+    state: State,
+    lanes: Lanes,
+    tables: TrafficTables,
+    leaders: Leaders,
+    requests: Requests,
+    busy: Int8,
+    egos: int,
+    actor: int,
+) -> tuple[float, float]:
     """The acceleration that a vehicle wants, and the highest speed that is safe, this tick.
 
     Returns:
