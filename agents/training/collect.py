@@ -9,21 +9,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import multiprocessing
-import signal
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from agents import load_agent
 from agents.base import Agent
+from agents.processes import Pool, in_order, processes
 from agents.training.corrections import corrected_drive
 from agents.training.frames import (
     FRAME_S,
@@ -103,25 +101,6 @@ class Outcome:
     fresh: bool = False
 
 
-class Pending(Protocol):
-    """A drive that is on its way, as `concurrent.futures.Future` has it."""
-
-    def result(self) -> Outcome: ...
-    def cancel(self) -> bool: ...
-
-
-class Pool(Protocol):
-    """Whatever drives jobs at the same time: processes here, or a cluster."""
-
-    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending: ...
-
-
-def processes(workers: int) -> AbstractContextManager[Pool]:
-    """So many processes of this machine."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, context, ignore_interrupts)
-
-
 def collect(
     folder: Path,
     towns: Sequence[str],
@@ -130,7 +109,7 @@ def collect(
     driver: str = EXPERT,
     first: int = 0,
     workers: int = 1,
-    pool: AbstractContextManager[Pool] | None = None,
+    pool: AbstractContextManager[Pool[DriveJob, Outcome]] | None = None,
 ) -> Generator[Outcome, None, None]:
     """Drives until each town has its share of the moments; yields each drive as it is there.
 
@@ -147,6 +126,7 @@ def collect(
 
     Raises:
         DriveFileError: If a file there is not whole, or of another driver.
+        ChildProcessError: If a process died.
     """
     share = share_of(frames, towns)
     with pool or processes(workers) as drivers:
@@ -163,7 +143,7 @@ def share_of(frames: int, towns: Sequence[str]) -> int:
     return -(-frames // len(towns))
 
 
-def warm_up(town: str) -> None:
+def compile_for_drives(town: str) -> None:
     """Makes a town, and has all kernels compiled that a drive needs."""
     env = _environment(town, EXPERT)
     observation, _ = env.reset(seed=0)
@@ -172,28 +152,21 @@ def warm_up(town: str) -> None:
     env.step(control)
 
 
-def ignore_interrupts() -> None:
-    """For worker processes: Ctrl-C is for the one that they work for."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def _collect_town(
-    pool: Pool, jobs: Iterator[DriveJob], share: int, workers: int
+    pool: Pool[DriveJob, Outcome], jobs: Iterator[DriveJob], share: int, workers: int
 ) -> Iterator[Outcome]:
-    """Drives in order of their numbers, a few ahead, until the first have enough moments."""
-    ahead = [pool.submit(drive_job, next(jobs)) for _ in range(workers)]
+    """Drives in order of their numbers, a few ahead, until the first have enough moments.
+
+    What was driven beyond them is removed: with fewer processes it would not be there.
+    """
     kept = 0
-    try:
-        while kept < share:
-            outcome = ahead.pop(0).result()
+    drives = in_order(pool, drive_job, jobs, ahead=workers, in_vain=_remove)
+    with closing(drives):
+        for outcome in drives:
             kept += outcome.moments
             yield outcome
-            if kept < share:
-                ahead.append(pool.submit(drive_job, next(jobs)))
-    finally:
-        running = [future for future in ahead if not future.cancel()]
-    for future in running:  # driven in vain: with fewer processes it would not be there
-        _remove(future.result())
+            if kept >= share:
+                return
 
 
 def _remove(outcome: Outcome) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
-import signal
 import zlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
 from agents.driveinsight.config import PolicyConfig
+from agents.processes import live_for_parent
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
@@ -265,10 +265,10 @@ def batches(
 
 
 def _begin_worker(_: int) -> None:
-    """Ctrl-C is for the process that trains: it stops its workers when it has saved.
+    """Lets the process that trains stop its workers, when it has saved.
 
     A worker leaves without tidying its interpreter up: torch may still be sending a batch that
     nobody waits for any more, and a thread that is ended in there aborts the process.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    live_for_parent()
     atexit.register(os._exit, 0)
