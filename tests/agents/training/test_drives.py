@@ -25,7 +25,7 @@ from di_envs.observation import Observer
 from di_envs.route_env import RouteEnv
 
 SAME = "agents.expert.agent:Expert"  # under another name: a learner that needs no correction
-IDLE = "learners:Idle"
+IDLE = "tests.agents.training.learners:Idle"
 GROUPS = ("camera", "lidar", "prompt", "odometry")
 
 
