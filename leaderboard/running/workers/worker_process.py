@@ -24,15 +24,10 @@ _FRAME = re.compile(r'File "(.+)", line (\d+) in (\S+)')
 
 
 class WorkerProcess:
-    """A fresh process that drives jobs of one run.
-
-    Attributes:
-        job: What it was handed and has not finished.
-    """
+    """A fresh process that drives jobs of one run."""
 
     def __init__(self, spec: RunSpec, limits: Limits) -> None:
         """Starts it; it begins when it is told to."""
-        self.job: Job | None = None
         self._limits = limits
         self._dead = False
         cells = FRESH.RawArray("d", CELLS)
@@ -60,7 +55,6 @@ class WorkerProcess:
 
     def hand_over(self, job: Job) -> None:
         """Gives it a job to drive."""
-        self.job = job
         self._send(job)
 
     def _send(self, value: object) -> None:
