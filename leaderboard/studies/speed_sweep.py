@@ -71,7 +71,10 @@ def _asked(folder: Path, indices: Sequence[int], workers: int) -> Iterator[None]
             yield
         return
     with processes(workers) as pool:
-        yield from in_order(pool, partial(ask_about, folder), indices, ahead=2 * workers)
+        try:
+            yield from in_order(pool, partial(ask_about, folder), indices, ahead=2 * workers)
+        except ChildProcessError as error:
+            raise StudyError(str(error)) from error
 
 
 def ask_about(folder: Path, index: int) -> None:
