@@ -25,9 +25,9 @@ from agents.processes import Pool, in_order, processes
 from agents.training.corrections import corrected_drive
 from agents.training.frames import (
     FRAME_S,
-    Drive,
     DriveFileError,
     DriveLog,
+    RecordedDrive,
     read_drive,
     write_drive,
     write_whole,
@@ -211,7 +211,7 @@ def _driver(driver: str) -> Agent[Any]:
     return load_agent(driver)
 
 
-def _drive(job: DriveJob) -> tuple[Drive, str]:
+def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
     """A drive, and why it is not worth keeping; empty if it is."""
     env = _environment(job.town, job.driver)
     seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
@@ -260,7 +260,7 @@ def _driven(
     return log, events, ended
 
 
-def without_standing_tail(drive: Drive) -> Drive:
+def without_standing_tail(drive: RecordedDrive) -> RecordedDrive:
     """The drive up to where it stood for good: a route that timed out ends in waiting."""
     moving = np.flatnonzero(drive.speeds() > STANDING_MPS)
     return drive.cut(int(moving[-1]) + 1 if len(moving) else 0)
@@ -306,7 +306,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
     }
 
 
-def _commands(drive: Drive) -> Counter[str]:
+def _commands(drive: RecordedDrive) -> Counter[str]:
     """How many moments were driven under each command."""
     env = _environment(str(drive.facts["town"]), EXPERT)
     plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])

@@ -23,9 +23,9 @@ from agents.processes import in_order, processes
 from agents.training.collect import drive_paths
 from agents.training.frames import (
     FRAME_S,
-    Drive,
     DriveFileError,
     DriveStage,
+    RecordedDrive,
     read_drive,
     write_whole,
 )
@@ -130,7 +130,7 @@ def write_shard(job: ShardJob) -> int:
     return sum(len(drive) for drive in drives)
 
 
-def _write(file: Any, drives: list[Drive], config: ExportConfig) -> None:
+def _write(file: Any, drives: list[RecordedDrive], config: ExportConfig) -> None:
     with tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar:
         for drive in drives:
             for key, parts in _samples(drive, config):
@@ -140,7 +140,7 @@ def _write(file: Any, drives: list[Drive], config: ExportConfig) -> None:
                     tar.addfile(entry, io.BytesIO(content))
 
 
-def _samples(drive: Drive, config: ExportConfig) -> Iterator[tuple[str, dict[str, bytes]]]:
+def _samples(drive: RecordedDrive, config: ExportConfig) -> Iterator[tuple[str, dict[str, bytes]]]:
     """Key and files of each moment."""
     facts = drive.facts
     town, route = str(facts["town"]), str(facts["route_id"])
