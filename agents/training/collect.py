@@ -9,27 +9,25 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import multiprocessing
-import signal
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from agents import load_agent
 from agents.base import Agent
+from agents.processes import Pool, in_order, processes
 from agents.training.corrections import corrected_drive
 from agents.training.frames import (
     FRAME_S,
-    Drive,
     DriveFileError,
     DriveLog,
+    RecordedDrive,
     read_drive,
     write_drive,
     write_whole,
@@ -104,25 +102,6 @@ class Outcome:
     fresh: bool = False
 
 
-class Pending(Protocol):
-    """A drive that is on its way, as `concurrent.futures.Future` has it."""
-
-    def result(self) -> Outcome: ...
-    def cancel(self) -> bool: ...
-
-
-class Pool(Protocol):
-    """Whatever drives jobs at the same time: processes here, or a cluster."""
-
-    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending: ...
-
-
-def processes(workers: int) -> AbstractContextManager[Pool]:
-    """So many processes of this machine."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, context, ignore_interrupts)
-
-
 def collect(
     folder: Path,
     towns: Sequence[str],
@@ -131,7 +110,7 @@ def collect(
     driver: str = EXPERT,
     first: int = 0,
     workers: int = 1,
-    pool: AbstractContextManager[Pool] | None = None,
+    pool: AbstractContextManager[Pool[DriveJob, Outcome]] | None = None,
 ) -> Generator[Outcome, None, None]:
     """Drives until each town has its share of the moments; yields each drive as it is there.
 
@@ -148,6 +127,7 @@ def collect(
 
     Raises:
         DriveFileError: If a file there is not whole, or of another driver.
+        ChildProcessError: If a process died.
     """
     share = share_of(frames, towns)
     with pool or processes(workers) as drivers:
@@ -164,7 +144,7 @@ def share_of(frames: int, towns: Sequence[str]) -> int:
     return -(-frames // len(towns))
 
 
-def warm_up(town: str) -> None:
+def compile_for_drives(town: str) -> None:
     """Makes a town, and has all kernels compiled that a drive needs."""
     env = _environment(town, EXPERT)
     observation, _ = env.reset(seed=0)
@@ -173,28 +153,21 @@ def warm_up(town: str) -> None:
     env.step(control)
 
 
-def ignore_interrupts() -> None:
-    """For worker processes: Ctrl-C is for the one that they work for."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def _collect_town(
-    pool: Pool, jobs: Iterator[DriveJob], share: int, workers: int
+    pool: Pool[DriveJob, Outcome], jobs: Iterator[DriveJob], share: int, workers: int
 ) -> Iterator[Outcome]:
-    """Drives in order of their numbers, a few ahead, until the first have enough moments."""
-    ahead = [pool.submit(drive_job, next(jobs)) for _ in range(workers)]
+    """Drives in order of their numbers, a few ahead, until the first have enough moments.
+
+    What was driven beyond them is removed: with fewer processes it would not be there.
+    """
     kept = 0
-    try:
-        while kept < share:
-            outcome = ahead.pop(0).result()
+    drives = in_order(pool, drive_job, jobs, ahead=workers, in_vain=_remove)
+    with closing(drives):
+        for outcome in drives:
             kept += outcome.moments
             yield outcome
-            if kept < share:
-                ahead.append(pool.submit(drive_job, next(jobs)))
-    finally:
-        running = [future for future in ahead if not future.cancel()]
-    for future in running:  # driven in vain: with fewer processes it would not be there
-        _remove(future.result())
+            if kept >= share:
+                return
 
 
 def _remove(outcome: Outcome) -> None:
@@ -239,7 +212,7 @@ def _driver(driver: str) -> Agent[Any]:
     return load_agent(driver)
 
 
-def _drive(job: DriveJob) -> tuple[Drive, str]:
+def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
     """A drive, and why it is not worth keeping; empty if it is."""
     env = _environment(job.town, job.driver)
     seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
@@ -288,7 +261,7 @@ def _driven(
     return log, events, ended
 
 
-def without_standing_tail(drive: Drive) -> Drive:
+def without_standing_tail(drive: RecordedDrive) -> RecordedDrive:
     """The drive up to where it stood for good: a route that timed out ends in waiting."""
     moving = np.flatnonzero(drive.speeds() > STANDING_MPS)
     return drive.cut(int(moving[-1]) + 1 if len(moving) else 0)
@@ -334,7 +307,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
     }
 
 
-def _commands(drive: Drive) -> Counter[str]:
+def _commands(drive: RecordedDrive) -> Counter[str]:
     """How many moments were driven under each command."""
     env = _environment(str(drive.facts["town"]), EXPERT)
     plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])

@@ -42,7 +42,7 @@ class DriveFileError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class RecordedDrive:
     """One route driven once.
 
     Attributes:
@@ -78,7 +78,7 @@ class Drive:
         """(F,) forward speed of the ego [m/s]."""
         return self.actors["speed"][self.first[:-1]]
 
-    def cut(self, moments: int) -> Drive:
+    def cut(self, moments: int) -> RecordedDrive:
         """The first moments alone."""
         rows = int(self.first[moments])
         return dataclasses.replace(
@@ -136,9 +136,9 @@ class DriveLog:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def drive(self, facts: dict[str, Any]) -> Drive:
+    def drive(self, facts: dict[str, Any]) -> RecordedDrive:
         """The drive so far."""
-        return Drive(
+        return RecordedDrive(
             facts=facts,
             capacity=self.view.capacity,
             whole={name: np.stack(values) for name, values in self.whole.items()},
@@ -162,7 +162,7 @@ class DriveStage:
         self.view = WorldView(town=town, state=self._state, plans=(plan,), capacity=capacity)
 
     def set(
-        self, drive: Drive, moment: int, *, right_m: float = 0.0, turn_rad: float = 0.0
+        self, drive: RecordedDrive, moment: int, *, right_m: float = 0.0, turn_rad: float = 0.0
     ) -> None:
         """Shows a moment, with the ego set aside.
 
@@ -186,7 +186,7 @@ class DriveStage:
         state.yaw[0] = yaw + turn_rad
 
 
-def write_drive(path: Path, drive: Drive) -> None:
+def write_drive(path: Path, drive: RecordedDrive) -> None:
     """Writes a drive; the file is there whole or not at all."""
     content: dict[str, Any] = {
         "format": np.array(FORMAT),
@@ -218,7 +218,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
             raise
 
 
-def read_drive(path: Path) -> Drive:
+def read_drive(path: Path) -> RecordedDrive:
     """Reads a drive.
 
     Raises:
@@ -232,7 +232,7 @@ def read_drive(path: Path) -> Drive:
             raise DriveFileError(
                 f"{path} is of format {version}, this program reads {FORMAT}: collect it again"
             )
-        return Drive(
+        return RecordedDrive(
             facts=json.loads(str(content["facts"])),
             capacity=Capacity(*content["capacity"].tolist()),
             whole=_part("whole.", content),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import gymnasium
 from gymnasium import spaces
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from agents.base import Requirements
 from di_envs.observation import observation_space
@@ -22,6 +21,7 @@ from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.compiling import compile_progress
+from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.driver import environment_options
 from leaderboard.running.episode import drive_route
 from leaderboard.running.interventions import sort_interventions
@@ -67,7 +67,7 @@ def drive(
             with compile_progress(console):  # cameras that the agent itself does not need
                 first, _ = env.reset(seed=job.world_seed, options={"route": job.route_id})
                 env.picture(first)
-        shown = closing.enter_context(_progress(console))
+        shown = closing.enter_context(work_bar("driving", "%", console=console))
         task = shown.add_task("", total=100.0)
 
         def watch(info: Mapping[str, Any], observation: dict[str, Any]) -> None:
@@ -162,16 +162,3 @@ def _environment(spec: RunSpec, requires: Requirements, *, filmed: bool, camera:
         return RouteEnv(render_mode="rgb_array" if filmed else None, **options)
     except (ValueError, OSError) as error:
         raise SetupError(str(error)) from error
-
-
-@contextlib.contextmanager
-def _progress(console: Console) -> Iterator[Progress]:
-    columns = (
-        TextColumn("  driving  "),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=console) as progress:
-        yield progress

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
-import signal
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from agents.one_thread import one_thread
+from agents.processes import in_order, processes
 from leaderboard.records.record import RouteRecord
 from leaderboard.records.results import read_run, replace_file
 from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
@@ -73,18 +72,11 @@ def _asked(folder: Path, indices: Sequence[int], workers: int) -> Iterator[None]
             ask_about(folder, index)
             yield
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_ctrl_c) as pool:
+    with processes(workers) as pool:
         try:
-            for done in as_completed([pool.submit(ask_about, folder, i) for i in indices]):
-                done.result()
-                yield
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _ignore_ctrl_c() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+            yield from in_order(pool, partial(ask_about, folder), indices, ahead=2 * workers)
+        except ChildProcessError as error:
+            raise StudyError(str(error)) from error
 
 
 def ask_about(folder: Path, index: int) -> None:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.training.collect import DriveJob, Outcome, Pending, Pool
+from agents.processes import Pending, Pool
+from agents.training.collect import DriveJob, Outcome
 from agents.training.frames import write_whole
 from di_envs.numerics.kernels import cpu_capability
 from leaderboard.records.versions import package_versions
@@ -36,7 +37,7 @@ class Footing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Driven:
+class Delivery:
     """What comes back from the cluster: what became of a drive, its file, and where it ran."""
 
     outcome: Outcome
@@ -44,13 +45,13 @@ class Driven:
     footing: Footing
 
 
-def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Driven:
+def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Delivery:
     """Drives on whatever machine this runs on, and leaves nothing there."""
     with tempfile.TemporaryDirectory(prefix="driveinsight-") as folder:
         there = dataclasses.replace(job, folder=Path(folder))
         outcome = drive(there)
         path = there.dropped_path if outcome.why else there.path
-        return Driven(
+        return Delivery(
             outcome=dataclasses.replace(outcome, job=job),
             content=path.read_bytes(),
             footing=Footing.here(),
@@ -71,7 +72,7 @@ class RayPending:
             SetupError: If it was driven on a machine that gives other bits, or not at all.
         """
         try:
-            driven: Driven = self.ray.get(self.reference)
+            driven: Delivery = self.ray.get(self.reference)
         except self.ray.exceptions.RayError as error:
             raise SetupError(f"the cluster did not drive it: {error}") from error
         check_footing(driven.footing)
@@ -103,20 +104,20 @@ class Found:
 
 @dataclass(frozen=True, kw_only=True)
 class RayPool:
-    """A cluster that drives; see `agents.training.collect.Pool`."""
+    """A cluster that drives; see `agents.processes.Pool`."""
 
     ray: Any
 
-    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending:
+    def submit(self, work: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending[Outcome]:
         """Has a job driven, unless its file is here."""
         if job.done:
-            return Found(outcome=drive(job))
+            return Found(outcome=work(job))
         elsewhere = self.ray.remote(num_cpus=1)(drive_elsewhere)
-        return RayPending(ray=self.ray, reference=elsewhere.remote(drive, job))
+        return RayPending(ray=self.ray, reference=elsewhere.remote(work, job))
 
 
 @contextlib.contextmanager
-def ray_pool(workers: int, address: str | None) -> Generator[Pool]:
+def ray_pool(workers: int, address: str | None) -> Generator[Pool[DriveJob, Outcome]]:
     """A cluster for as long as this lasts.
 
     Args:
