@@ -198,7 +198,7 @@ def test_a_run_says_what_a_rerun_needs(tmp_path):
     assert {"python", "driveinsight", "numpy", "numba"} <= run.versions.keys()
     assert run.track == "PROMPT"
     assert run.options["route_ids"] == [ROUTE]
-    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash, run.agent_hash))
+    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash, run.agent_version))
     assert sorted(os.listdir(tmp_path)) == ["driveinsight.json", "results.json", "routes"]
 
 
