@@ -33,12 +33,15 @@ from agents.training.frames import (
     write_whole,
 )
 from agents.training.towns import town_files
+from agents.versions import agent_version
+from di_envs.differences import differences
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
 from di_envs.town.plan import RoadOption
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from di_envs.world.world import Event
+from di_envs.world_version import WORLD_VERSION
 
 CARD_FILE = "card.json"
 WEATHER_NOTE = "none: it is drawn from 14 presets whenever a moment is rendered"
@@ -126,7 +129,8 @@ def collect(
         pool: Where; None for processes of this machine.
 
     Raises:
-        DriveFileError: If a file there is not whole, or of another driver.
+        DriveFileError: If a file there is not whole, or of another driver, other weights or another
+            version of the world.
         ChildProcessError: If a process died.
     """
     share = share_of(frames, towns)
@@ -179,22 +183,39 @@ def _remove(outcome: Outcome) -> None:
 def drive_job(job: DriveJob) -> Outcome:
     """Drives, unless that was done before, and writes the drive or why it is dropped."""
     if job.dropped_path.exists():
-        return Outcome(job=job, moments=0, why=json.loads(job.dropped_path.read_text())["why"])
+        dropped = json.loads(job.dropped_path.read_text())
+        _check_same(job.dropped_path, dropped, job)
+        return Outcome(job=job, moments=0, why=dropped["why"])
     if job.path.exists():
         drive = read_drive(job.path)
-        if drive.facts.get("driver", EXPERT) != job.driver:
-            raise DriveFileError(
-                f"{job.path} was driven by {drive.facts.get('driver', EXPERT)}, not by "
-                f"{job.driver}: name another --output"
-            )
+        _check_same(job.path, drive.facts, job)
         return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
-        text = json.dumps({"why": why}) + "\n"
+        text = json.dumps({"why": why, **_driven_by(job.driver)}) + "\n"
         write_whole(job.dropped_path, lambda file: file.write(text.encode()))
         return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
     return Outcome(job=job, moments=len(drive), fresh=True)
+
+
+@lru_cache(2)
+def _driven_by(driver: str) -> Mapping[str, Any]:
+    """Who drives, and in which world: what all drives of a folder have in common."""
+    return {
+        "driver": driver,
+        "agent_version": agent_version(driver),
+        "world_version": WORLD_VERSION,
+    }
+
+
+def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:
+    """Refuses to go on where others have driven, or in another world."""
+    ours = _driven_by(job.driver)
+    theirs = {name: facts.get(name) for name in ours}
+    if found := differences(theirs, ours):
+        said = "; ".join(difference.was_is for difference in found)
+        raise DriveFileError(f"{path} is none of these drives ({said}): name another --output")
 
 
 @lru_cache(2)
@@ -230,7 +251,7 @@ def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
         "seed": seed,
         "finished": finished,
         "scenarios": _scenarios(events),
-        "driver": job.driver,
+        **_driven_by(job.driver),
     }
     drive = dataclasses.replace(log.drive(facts), shown=shown)
     if finished == "timeout" and shown is None:

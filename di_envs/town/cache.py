@@ -1,7 +1,8 @@
 """Parsed towns in the user's cache folder, safe when several processes write at once.
 
-A town is one `.npz` file named by the hash of all that it was made from. A file that cannot be read
-is no error: the town is parsed again and the file replaced.
+A town is one `.npz` file named by a hash of all that it was made from: the map, its signals and the
+reader's own source, so that an edited reader never finds what another one left. A file that cannot
+be read is no error: the town is parsed again and the file replaced.
 """
 
 from __future__ import annotations
@@ -58,14 +59,19 @@ def reader_version() -> str:
 
 
 def content_hash(opendrive: bytes, signals: bytes) -> str:
-    """The identity of a town: its OpenDRIVE file, its signals and the reader."""
-    parts = (opendrive, signals, reader_version().encode())
-    digests = b"".join(hashlib.sha256(part).digest() for part in parts)
+    """The identity of a town: its OpenDRIVE file and its signals, whoever reads them."""
+    digests = b"".join(hashlib.sha256(part).digest() for part in (opendrive, signals))
     return hashlib.sha256(digests).hexdigest()[:32]
 
 
-def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | None:
-    """The town of a key, or None where there is no readable one."""
+def cache_key(town_hash: str) -> str:
+    """What the file of a town is called: the town, as this reader reads it."""
+    return hashlib.sha256(f"{town_hash} {reader_version()}".encode()).hexdigest()[:32]
+
+
+def load_cached(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | None:
+    """The town of a `content_hash`, or None where there is no readable one."""
+    key = cache_key(town_hash)
     path = folder / f"{key}.npz"
     try:
         # Opened here: np.load would leave a file open that turns out to be no archive.
@@ -84,7 +90,7 @@ def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | Non
         road_names=tuple(about["road_names"]),
         junction_names=tuple(about["junction_names"]),
         geo_origin=(about["geo_origin"][0], about["geo_origin"][1]),
-        content_hash=key,
+        content_hash=town_hash,
         opendrive=opendrive,
         **arrays,
     )
@@ -95,8 +101,9 @@ _PARTS: dict[str, Any] = {"lanes": Lanes, "signals": Signals, "crosswalks": Cros
 
 def store(town: Town, folder: Path) -> None:
     """Writes a town for later; a cache folder that cannot be written is not an error."""
+    key = cache_key(town.content_hash)
     about = {
-        "key": town.content_hash,
+        "key": key,
         "road_names": town.road_names,
         "junction_names": town.junction_names,
         "geo_origin": town.geo_origin,
@@ -114,7 +121,7 @@ def store(town: Town, folder: Path) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez(file, about=np.array(json.dumps(about)), **arrays)
-        os.replace(temporary, folder / f"{town.content_hash}.npz")
+        os.replace(temporary, folder / f"{key}.npz")
     except OSError:
         Path(temporary).unlink(missing_ok=True)
 

@@ -83,10 +83,10 @@ def explain_page(explanation: Explanation) -> Page:
 def _notes(explanation: Explanation) -> Iterator[str]:
     """What a reader must know before the pictures."""
     yield from explanation.missing
-    done = explanation.record.interventions
+    run, done = explanation.run, explanation.record.interventions
     if done:
         yield f"With what was done to the world, or to what the agent saw: {'; '.join(done)}."
-    differences = footing_differences(footing_here(), footing_of(explanation.run))
+    differences = footing_differences(footing_here(run.agent), footing_of(run))
     if differences:
         yield (
             f"Retraced on {'; '.join(differences)} in the run; the agent saw and did the same all "

@@ -205,7 +205,7 @@ def facts_table(run: RunRecord) -> Markup:
     """What the results rest on."""
     options = ", ".join(f"{name}={value}" for name, value in sorted(run.options.items()))
     pairs = {
-        "agent": f"{run.agent} ({run.agent_hash})",
+        "agent": f"{run.agent} ({run.agent_version})",
         "track": run.track,
         "suite": f"{run.suite}" + (f", version {run.suite_version}" if run.suite_version else ""),
         "town": f"{run.town} ({run.town_hash})",

@@ -10,11 +10,12 @@ from typing import Any, TypeVar
 
 from di_envs.world.kinds import EventKind
 from leaderboard.records.record import Bound, EventRecord, RouteRecord, RunRecord
+from leaderboard.records.versions import INFORMATION
 from leaderboard.scoring.score import Score
 
 FORMAT = "driveinsight-run"
 ROUTE_FORMAT = "driveinsight-route"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 # Annotations that a JSON value can be held against
 _TYPES: Mapping[str, tuple[type, ...]] = {"int": (int,), "float": (int, float), "str": (str,)}
@@ -23,8 +24,14 @@ _Record = TypeVar("_Record")
 
 
 def run_hash(run: RunRecord) -> str:
-    """What a run's routes call it by: a hash of everything but the routes."""
-    text = json.dumps(run_to_json(run), sort_keys=True)
+    """What a run's routes call it by: a hash of all but the routes, and what is information only.
+
+    So a run that goes on under another Python stays that run.
+    """
+    content = run_to_json(run)
+    for name in INFORMATION:
+        content["versions"].pop(name, None)
+    text = json.dumps(content, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 

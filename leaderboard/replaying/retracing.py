@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from agents import AgentSpecError
 from agents.base import Agent, Control, Observation
+from agents.versions import agent_version
 from di_envs.edits.text import EditError
 from di_envs.observation import observation_space
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera.config import Rig, rig_of
 from leaderboard.records.episode_hash import observation_check
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.records.versions import agent_hash
 from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay_env, sensor_options
 from leaderboard.running.episode import close_agent, describe, extra_keys, plan_shown
 from leaderboard.running.interventions import (
@@ -285,7 +285,7 @@ def _decided(
 
 def _why(run: RunRecord) -> str:
     """What may be the reason, as far as it can be told."""
-    if agent_hash(run.agent) != run.agent_hash:
+    if agent_version(run.agent) != run.agent_version:
         return (
             f"the code or the weights that '{run.agent}' leads to are not those of the run; put "
             "them back, or evaluate again"

@@ -184,7 +184,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
     return RunRecord(
         rules=spec.rules,
         agent=spec.agent,
-        agent_hash=scene.agent_hash,
+        agent_version=scene.agent_version,
         track=str(requires.track),
         requires={
             "observations": list(requires.observations),

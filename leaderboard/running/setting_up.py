@@ -6,8 +6,9 @@ import hashlib
 
 from agents import AgentSpecError
 from agents.base import Requirements
+from agents.versions import agent_version
 from di_envs.numerics.kernels import cpu_capability
-from leaderboard.records.versions import agent_hash, package_versions
+from leaderboard.records.versions import package_versions
 from leaderboard.running.driver import Driver, agent_requirements
 from leaderboard.running.episode import describe
 from leaderboard.running.finished_route import route_hash
@@ -61,11 +62,11 @@ def scene_of(driver: Driver) -> Scene:
         routes.update(f"{plan.route_id}\0{route_hash(plan)}\0".encode())
     return Scene(
         requires=driver.requires,
-        agent_hash=agent_hash(driver.spec.agent),
+        agent_version=agent_version(driver.spec.agent),
         town=town.name,
         town_hash=town.content_hash,
         route_ids=tuple(driver.env.route_ids),
         routes_hash=routes.hexdigest(),
-        versions=package_versions(),
+        versions=package_versions(driver.spec.agent),
         cpu=cpu_capability(),
     )

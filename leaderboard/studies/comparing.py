@@ -10,9 +10,10 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from di_envs.differences import differences
 from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
-from leaderboard.records.footing import footing_differences, footing_of
+from leaderboard.records.footing import footing_differences, footing_of, record_differences
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.statistics.bootstrap import BootstrapInterval, clustered_interval
 
@@ -138,14 +139,10 @@ def compare_runs(before: RunRecord, after: RunRecord) -> Comparison:
 def _obstacles(before: RunRecord, after: RunRecord) -> Iterator[str]:
     """Why the worlds of two runs are not the same, a few words each."""
     yield from footing_differences(footing_of(before), footing_of(after))
-    for name in ("suite", "suite_version", "town", "town_hash"):
-        one, other = getattr(before, name), getattr(after, name)
-        if one != other:
-            yield f"{name} {one}, not {other}"
-    ours, theirs = _world_options(before), _world_options(after)
-    for name in sorted(ours.keys() | theirs.keys()):
-        if ours.get(name) != theirs.get(name):
-            yield f"option {name} {ours.get(name)!r}, not {theirs.get(name)!r}"
+    fields = ("suite", "suite_version", "town", "town_hash")
+    found = record_differences(before, after, fields)
+    ours, theirs = ({"option": _world_options(run)} for run in (before, after))
+    yield from (difference.is_not for difference in (*found, *differences(ours, theirs)))
 
 
 def _world_options(run: RunRecord) -> dict[str, object]:

@@ -17,6 +17,7 @@ from rich.console import Console
 
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.footing import record_differences
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
 from leaderboard.records.resuming import resumed
@@ -33,12 +34,12 @@ from leaderboard.studies.looking_ahead import look_ahead
 from leaderboard.studies.more_seeds import recover_run, replace_run, with_seeds
 from leaderboard.studies.record import DrivenRow, Study, StudyDrive, study_of
 from leaderboard.studies.rows import BASELINE, BASELINE_ROW, NULL, NULL_ROW, Row
-from leaderboard.studies.study_file import STUDY_FILE, as_read, read_study
+from leaderboard.studies.study_file import STUDY_FILE, read_study
 
 ROWS_FOLDER = "rows"
 # What must be as it was for a study to go on; rows and seeds may come to it
 _SAME = (
-    *("kind", "agent", "agent_hash", "requires", "suite", "suite_version", "options", "rules"),
+    *("kind", "agent", "agent_version", "requires", "suite", "suite_version", "options", "rules"),
     *("town_hash", "routes_hash", "interventions", "versions", "cpu"),
 )
 
@@ -261,18 +262,9 @@ def _bits(record: RouteRecord) -> object:
 
 def _check_same(folder: Path, earlier: Study, now: Study) -> None:
     """Refuses to go on with another study."""
-    differences = []
-    now = as_read(now)
-    for name in _SAME:
-        old, new = getattr(earlier, name), getattr(now, name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            for key in sorted(old.keys() | new.keys()):
-                if old.get(key) != new.get(key):
-                    differences.append(f"{name} '{key}' was {old.get(key)}, is {new.get(key)}")
-        elif old != new:
-            differences.append(f"{name} was {old}, is {new}")
-    if differences:
+    if found := record_differences(earlier, now, _SAME):
+        said = "; ".join(difference.was_is for difference in found)
         raise StudyError(
-            f"{folder} holds another study, its results would mix: {'; '.join(differences)}. "
-            "Repeat the command as it was, or choose another --output"
+            f"{folder} holds another study, its results would mix: {said}. Repeat the command as "
+            "it was, or choose another --output"
         )

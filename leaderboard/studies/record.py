@@ -101,7 +101,7 @@ class Study:
 
     kind: str
     agent: str
-    agent_hash: str
+    agent_version: str
     track: str
     requires: Mapping[str, Any]
     suite: str
@@ -155,7 +155,7 @@ def study_of(kind: str, head: RunRecord, interventions: tuple[str, ...]) -> Stud
     return Study(
         kind=kind,
         agent=head.agent,
-        agent_hash=head.agent_hash,
+        agent_version=head.agent_version,
         track=head.track,
         requires=head.requires,
         suite=head.suite,

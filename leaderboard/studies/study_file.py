@@ -14,7 +14,7 @@ from leaderboard.studies.record import DrivenRow, Study, StudyDrive
 from leaderboard.studies.rows import Row
 
 STUDY_FILE = "study.json"
-FORMAT, FORMAT_VERSION = "driveinsight-study", 1
+FORMAT, FORMAT_VERSION = "driveinsight-study", 2
 _DRIVE = tuple(part.name for part in dataclasses.fields(StudyDrive))
 
 
@@ -47,15 +47,6 @@ def write_study(folder: Path, study: Study, findings: Mapping[str, Any] | None =
         replace_file(folder / STUDY_FILE, "{\n" + ",\n".join(lines) + "\n}\n")
     except OSError as error:
         raise StudyError(f"cannot write {folder / STUDY_FILE} ({error.strerror})") from error
-
-
-def as_read(study: Study) -> Study:
-    """The study as its file would be read: tuples within values are lists there."""
-    plain = {
-        name: json.loads(json.dumps(getattr(study, name)))
-        for name in ("requires", "options", "versions")
-    }
-    return dataclasses.replace(study, **plain)
 
 
 def read_study(path: Path) -> Study:

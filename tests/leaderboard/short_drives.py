@@ -23,6 +23,7 @@ def short_run(
     *,
     suite: str = "toy",
     route_id: str = "",
+    seed: int = 0,
     interventions: tuple[str, ...] = (),
     **options: Any,
 ) -> RunRecord:
@@ -30,7 +31,7 @@ def short_run(
     route_id = route_id or load_suite(suite).specs()[0].route_id
     options = {"suite": suite, "route_ids": (route_id,), **options}
     spec = RunSpec(agent=agent, options=options, interventions=interventions)
-    job = Job(index=0, route_id=route_id, seed=0)
+    job = Job(index=0, route_id=route_id, seed=seed)
     with set_up(spec, Stopwatch()) as driver:
         scene = scene_of(driver)
         record = drive_route(

@@ -1,7 +1,8 @@
 """Collects drives on a Ray cluster: driven wherever there is room, written here.
 
 The machines need no folder in common: a drive comes back as the bytes of its file. These are the
-same on equal footing only, so a machine whose CPU or versions are not those of this one is refused.
+same on equal footing only, so a machine whose CPU, versions or driver are not those of this one is
+refused.
 """
 
 from __future__ import annotations
@@ -17,23 +18,16 @@ from typing import Any
 from agents.processes import Pending, Pool
 from agents.training.collect import DriveJob, Outcome
 from agents.training.frames import write_whole
-from di_envs.numerics.kernels import cpu_capability
-from leaderboard.records.versions import package_versions
+from agents.versions import agent_version
+from di_envs.differences import differences
+from leaderboard.records.footing import footing_here
 from leaderboard.running.jobs import SetupError
 from leaderboard.running.workers.ray_engine import cluster
 
 
-@dataclass(frozen=True, kw_only=True)
-class Footing:
-    """What the bits of a drive depend on beside its town and number."""
-
-    cpu: str
-    versions: Mapping[str, str]
-
-    @classmethod
-    def here(cls) -> Footing:
-        """This machine's."""
-        return cls(cpu=cpu_capability(), versions=package_versions())
+def footing_of_driver(driver: str) -> Mapping[str, str]:
+    """What the bits of a drive depend on beside its town and number, on this machine."""
+    return {**footing_here(driver), "the driver": agent_version(driver)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +36,7 @@ class Delivery:
 
     outcome: Outcome
     content: bytes
-    footing: Footing
+    footing: Mapping[str, str]
 
 
 def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Delivery:
@@ -54,7 +48,7 @@ def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Deli
         return Delivery(
             outcome=dataclasses.replace(outcome, job=job),
             content=path.read_bytes(),
-            footing=Footing.here(),
+            footing=footing_of_driver(job.driver),
         )
 
 
@@ -75,8 +69,8 @@ class RayPending:
             driven: Delivery = self.ray.get(self.reference)
         except self.ray.exceptions.RayError as error:
             raise SetupError(f"the cluster did not drive it: {error}") from error
-        check_footing(driven.footing)
         job = driven.outcome.job
+        check_footing(driven.footing, footing_of_driver(job.driver))
         path = job.dropped_path if driven.outcome.why else job.path
         write_whole(path, lambda file: file.write(driven.content))
         return driven.outcome
@@ -131,24 +125,15 @@ def ray_pool(workers: int, address: str | None) -> Generator[Pool[DriveJob, Outc
         yield RayPool(ray=ray)
 
 
-def check_footing(footing: Footing) -> None:
+def check_footing(there: Mapping[str, str], here: Mapping[str, str]) -> None:
     """Refuses a machine that would give other bits than this one.
 
     Raises:
-        SetupError: If its CPU or its versions are others.
+        SetupError: If its CPU, its versions or its driver are others.
     """
-    ours = Footing.here()
-    if footing.cpu != ours.cpu:
+    if found := differences(there, here):
+        said = "; ".join(difference.is_not for difference in found)
         raise SetupError(
-            f"a machine of the cluster has another CPU ({footing.cpu}, here {ours.cpu}), so its "
-            f"drives would have other bits: collect with machines that are alike"
-        )
-    other = [
-        f"{name} {footing.versions.get(name, 'missing')} (here {version})"
-        for name, version in ours.versions.items()
-        if footing.versions.get(name) != version
-    ]
-    if other:
-        raise SetupError(
-            f"a machine of the cluster has other versions: {', '.join(other)}: install the same"
+            f"a machine of the cluster differs from this one ({said}), so its drives would have "
+            "other bits: collect with machines that are alike, with the same packages and files"
         )

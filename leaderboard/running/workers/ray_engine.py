@@ -13,13 +13,14 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
 from agents.base import Requirements
+from leaderboard.records.footing import record_differences
 from leaderboard.records.record import WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.messages import (
@@ -146,24 +147,19 @@ def check_footing(first: Scene, other: Scene) -> None:
     Raises:
         SetupError: If its CPU, versions, map, routes or agent are not those of the first worker.
     """
-    for name in ("cpu", "versions", "town_hash", "routes_hash", "agent_hash"):
-        ours, theirs = getattr(first, name), getattr(other, name)
-        if ours != theirs:
-            raise SetupError(
-                f"machines of the cluster differ in {name} ({_text(ours)} and {_text(theirs)}), "
-                "so the same route would not give the same bits: use machines that are alike, "
-                "with the same packages and files"
-            )
+    fields = ("cpu", "versions", "town_hash", "routes_hash", "agent_version")
+    if found := record_differences(first, other, fields):
+        said = "; ".join(difference.is_not for difference in found)
+        raise SetupError(
+            f"machines of the cluster differ ({said}), so the same route would not give the same "
+            "bits: use machines that are alike, with the same packages and files"
+        )
 
 
 def _brief(error: Exception) -> str:
     """The line of Ray's report that says what happened: an exception's last, else the first."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if "Error: " in lines[-1] else lines[0]
-
-
-def _text(value: Any) -> str:
-    return ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else value
 
 
 def _absolute(spec: RunSpec) -> RunSpec:

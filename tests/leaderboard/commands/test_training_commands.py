@@ -5,15 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 import tarfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from agents.versions import agent_version
 from leaderboard.commands.cli import main
 from leaderboard.commands.ending import EXIT_USAGE
-from leaderboard.records.versions import agent_hash
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +77,13 @@ def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_pa
     assert "planner (" in out
 
 
-def test_a_policys_hash_changes_with_its_weights(policy, tmp_path):
-    before = agent_hash(f"driveinsight:{policy}")
-    assert before == agent_hash(f"driveinsight:{policy}")
-    (tmp_path / "weights.safetensors").write_bytes(b"other")
-    assert agent_hash(f"driveinsight:{tmp_path}") != before
+def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy, tmp_path):
+    copy = Path(shutil.copytree(policy, tmp_path / "copy"))
+    before = agent_version(f"driveinsight:{policy}")
+    (copy / "README.md").write_text("another card")
+    assert agent_version(f"driveinsight:{copy}") == before
+    (copy / "weights.safetensors").write_bytes(b"other")
+    assert agent_version(f"driveinsight:{copy}") != before
 
 
 @pytest.mark.parametrize(

@@ -301,7 +301,7 @@ def test_a_file_of_another_version_or_without_a_field_is_refused(tmp_path):
         ('"red_light"', '"blue_light"', "BLUE_LIGHT"),
         (' "steps": 2000,\n', "", "KeyError.*steps"),
         ('"tick":40', '"tick":"40"', "tick must be of type int"),
-        ('"format_version": 2', '"format_version": 1', "format version 1, this program reads 2"),
+        ('"format_version": 3', '"format_version": 2', "format version 2, this program reads 3"),
         ('"driveinsight-route"', '"driveinsight-run"', "is not a 0000.json of ours"),
         ('"index": 0', '"index": 7', "it was renamed"),
     ],

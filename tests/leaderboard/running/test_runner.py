@@ -195,10 +195,11 @@ def test_a_run_says_what_a_rerun_needs(tmp_path):
     run = evaluated(RunSpec(agent="constant", options=QUIET), [0], tmp_path)
     assert (run.suite, run.suite_version) == (TOY.name, TOY.version)
     assert run.cpu == cpu_capability()
-    assert {"python", "driveinsight", "numpy", "numba"} <= run.versions.keys()
+    assert {"python", "driveinsight", "world", "numpy", "numba"} <= run.versions.keys()
     assert run.track == "PROMPT"
     assert run.options["route_ids"] == [ROUTE]
-    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash, run.agent_hash))
+    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash))
+    assert run.agent_version == "constant 1"
     assert sorted(os.listdir(tmp_path)) == ["driveinsight.json", "results.json", "routes"]
 
 

@@ -15,7 +15,7 @@ from leaderboard.running.workers.scheduler import Scheduler
 
 SCENE = Scene(
     requires=Requirements(),
-    agent_hash="ab",
+    agent_version="ab",
     town="toy",
     town_hash="cd",
     route_ids=("0",),

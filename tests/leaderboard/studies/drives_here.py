@@ -71,7 +71,7 @@ def study(*rows: DrivenRow, **fields: object) -> Study:
     values = {
         "kind": "ablation",
         "agent": "mine.py:Mine",
-        "agent_hash": "ab",
+        "agent_version": "ab",
         "track": "PROMPT",
         "requires": {"observations": ["prompt"]},
         "suite": "town05_short",
@@ -82,7 +82,7 @@ def study(*rows: DrivenRow, **fields: object) -> Study:
         "town_hash": "cd",
         "routes_hash": "ef",
         "interventions": (),
-        "versions": {"python": "3.11"},
+        "versions": {"python": "3.11", "numpy": "2.4.6", "world": "1"},
         "cpu": "generic",
         "seeds": (0,),
         **fields,

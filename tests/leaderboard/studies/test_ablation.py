@@ -157,7 +157,7 @@ def test_rows_are_chosen_by_row_by_text_or_by_component():
     [
         (lambda text: text[: len(text) // 2], "is not whole JSON"),
         (lambda text: text.replace("driveinsight-study", "other"), "no record of a study"),
-        (lambda text: text.replace('"format_version": 1', '"format_version": 9'), "version 9"),
+        (lambda text: text.replace('"format_version": 2', '"format_version": 9'), "version 9"),
         (lambda text: text.replace('"town_hash"', '"town_has"'), "lacks or garbles a field"),
         (lambda text: text.replace("90.0", '"90"', 1), "driving_score of a drive is no number"),
     ],

@@ -113,12 +113,13 @@ def test_lost_routes_and_those_of_one_run_only_are_left_out_and_counted():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"versions": {"python": "3.12"}}, "python 3.11, not 3.12"),
+        ({"versions": {"numpy": "2.3.1", "world": "1"}}, r"numpy 2\.4\.6, not 2\.3\.1"),
+        ({"versions": {"numpy": "2.4.6", "world": "2"}}, "world 1, not 2"),
         ({"cpu": "avx2"}, "CPU generic, not avx2"),
         ({"suite": "town05_short"}, "suite town05_long, not town05_short"),
         ({"suite_version": 2}, "suite_version 1, not 2"),
-        ({"town_hash": "00"}, "town_hash ff, not 00"),
-        ({"options": {"traffic": 4}}, "option traffic 3, not 4"),
+        ({"town_hash": "00"}, "the hash of the town's map ff, not 00"),
+        ({"options": {"traffic": 4}}, "option 'traffic' 3, not 4"),
         ({"rules": "carla-2.0"}, "pass --rules"),
     ],
 )
@@ -126,6 +127,21 @@ def test_runs_of_other_worlds_are_refused(change, message):
     before, after = runs()
     with pytest.raises(PairingError, match=message):
         compare_runs(before, replace(after, **change))
+
+
+def test_another_python_and_what_only_one_driver_rests_on_are_no_obstacle():
+    before, after = runs()
+    other = {**after.versions, "python": "3.12", "driveinsight": "0.2", "torch": "2.13.0"}
+    assert len(compare_runs(before, replace(after, versions=other)).pairs) == 3
+
+
+def test_two_drivers_that_learnt_rest_on_the_same_torch():
+    before, after = (
+        replace(run, versions={**run.versions, "torch": version})
+        for run, version in zip(runs(), ("2.13.0", "2.12.0"), strict=True)
+    )
+    with pytest.raises(PairingError, match=r"torch 2\.13\.0, not 2\.12\.0"):
+        compare_runs(before, after)
 
 
 def test_what_only_the_agent_sees_may_differ():

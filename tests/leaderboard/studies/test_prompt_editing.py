@@ -263,6 +263,16 @@ def test_an_agent_that_knows_no_lights_drives_over_the_red_ones_that_it_meets():
     assert reds <= events <= reds + sum(not each.crossed for each in found)
 
 
+def test_a_light_that_was_yellow_as_the_ego_drove_over_it_is_a_red_one_that_it_met():
+    """No infraction, as yellow is free; yet whoever is shown green there is led by it."""
+    run = short_run("expert-redrunner", 120, route_id="2", seed=1, traffic=2, walkers=1)
+    assert not any(event.kind.name == "RED_LIGHT" for event in run.routes[0].events)
+    env = replay_env(run)
+    found = [(each.colour, each.crossed) for each in approaches(run, run.routes[0], env)]
+    assert found == [("green", False), ("red", True)]
+    env.close()
+
+
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
