@@ -8,7 +8,6 @@ together have the moments asked for.
 from __future__ import annotations
 
 import dataclasses
-import json
 import multiprocessing
 import signal
 from collections import Counter
@@ -31,8 +30,9 @@ from agents.training.frames import (
     DriveFileError,
     DriveLog,
     read_drive,
+    read_dropped,
     write_drive,
-    write_whole,
+    write_dropped,
 )
 from agents.training.towns import town_files
 from di_envs.numerics.keyed_random import Stream, keyed_hash
@@ -205,7 +205,7 @@ def _remove(outcome: Outcome) -> None:
 def drive_job(job: DriveJob) -> Outcome:
     """Drives, unless that was done before, and writes the drive or why it is dropped."""
     if job.dropped_path.exists():
-        return Outcome(job=job, moments=0, why=json.loads(job.dropped_path.read_text())["why"])
+        return Outcome(job=job, moments=0, why=read_dropped(job.dropped_path))
     if job.path.exists():
         drive = read_drive(job.path)
         if drive.facts.get("driver", EXPERT) != job.driver:
@@ -216,8 +216,7 @@ def drive_job(job: DriveJob) -> Outcome:
         return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
-        text = json.dumps({"why": why}) + "\n"
-        write_whole(job.dropped_path, lambda file: file.write(text.encode()))
+        write_dropped(job.dropped_path, why)
         return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
     return Outcome(job=job, moments=len(drive), fresh=True)
@@ -319,7 +318,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         drivers[drive.facts.get("driver", EXPERT)] += len(drive)
     dropped = Counter[str]()
     for path in sorted(folder.glob("*/*.dropped.json")):
-        dropped[json.loads(path.read_text())["why"]] += 1
+        dropped[read_dropped(path)] += 1
     return {
         "moments": sum(towns.values()),
         "seconds_apart": FRAME_S,

@@ -6,7 +6,6 @@ The file holds everything it needs, asks for nothing else, and is readable witho
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from di_envs.files.whole import write_whole
 from di_envs.route_env import RouteEnv
 from di_envs.town.town import Town
 from di_envs.world.kinds import ActorKind
@@ -174,13 +174,9 @@ def write_report(path: Path, page: str) -> int:
         ReportError: If it cannot be written.
     """
     data = page.encode()
-    beside = path.with_name(f".{path.name}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        os.replace(beside, path)
+        write_whole(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise ReportError(
             f"cannot write {path} ({error.strerror}): choose another --output"
         ) from error

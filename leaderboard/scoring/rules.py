@@ -6,13 +6,13 @@ Source: CARLA Leaderboard, branches `leaderboard-1.0`, `-2.0` and `-2.1` (penalt
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import ClassVar
 
+from di_envs.files.names import name_hint
 from di_envs.penalties import PENALTIES, Penalties
 from di_envs.world.kinds import EventKind
 
@@ -142,7 +142,5 @@ def rules_named(name: str) -> Rules:
         ValueError: If there are none; the message lists those there are.
     """
     if name not in RULES:
-        near = difflib.get_close_matches(name, RULES, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"unknown rules '{name}'; {hint}known: {', '.join(RULES)}")
+        raise ValueError(f"unknown rules '{name}'; {name_hint(name, RULES)}")
     return RULES[name]

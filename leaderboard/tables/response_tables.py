@@ -5,7 +5,6 @@ The same rows make a terminal's table and Markdown.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from agents.explain.situations import SAYS
+from di_envs.files.json_values import indented
+from di_envs.files.whole import write_whole
 from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
 from leaderboard.responding.drive_responses import DriveResponses
@@ -80,11 +81,10 @@ def write_tables(
     Raises:
         OSError: If they cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     text, numbers = folder / "responses.md", folder / "responses.json"
-    text.write_text("\n".join(table.markdown() for table in tables), encoding="utf-8")
+    write_whole(text, "\n".join(table.markdown() for table in tables))
     values = as_values(drives, examined(drives), head_consistency(drives))
-    numbers.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(numbers, indented(values))
     return text, numbers
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.training.collect import DriveJob, Outcome, Pending, Pool
-from agents.training.frames import write_whole
+from di_envs.files.whole import write_whole
 from di_envs.numerics.kernels import cpu_capability
 from leaderboard.records.versions import package_versions
 from leaderboard.running.jobs import SetupError
@@ -77,7 +77,7 @@ class RayPending:
         check_footing(driven.footing)
         job = driven.outcome.job
         path = job.dropped_path if driven.outcome.why else job.path
-        write_whole(path, lambda file: file.write(driven.content))
+        write_whole(path, driven.content)
         return driven.outcome
 
     def cancel(self) -> bool:
