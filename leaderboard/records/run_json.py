@@ -75,7 +75,6 @@ def route_from_json(content: Mapping[str, Any], source: str = "route") -> RouteR
     product = record.score.driving_score
     if given != product or isinstance(given, bool):
         raise JsonError(
-            f"{source}: score.driving_score: expected {product}, the product of the others, "
-            f"got {given!r}"
+            f"{source}: score.driving_score: {given!r} is not the product of the others, {product}"
         )
     return record

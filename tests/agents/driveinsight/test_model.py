@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 
 import pytest
 import torch
@@ -207,6 +208,19 @@ def test_a_policy_survives_the_way_to_disk_and_back(tmp_path, small):
     inputs = random_inputs(small.config)
     with torch.inference_mode():
         assert torch.equal(loaded(inputs).waypoints, small(inputs).waypoints)
+
+
+def _full(_: int) -> None:
+    raise OSError("the disk is full")
+
+
+def test_weights_that_cannot_be_written_leave_the_old_ones(tmp_path, small, monkeypatch):
+    save_pretrained(small, tmp_path, card="old")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr(os, "fsync", _full)
+    with pytest.raises(OSError, match="the disk is full"):
+        save_pretrained(new_policy("small-prompt-only"), tmp_path, card="new")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_broken_or_foreign_weights_are_refused(tmp_path, small):

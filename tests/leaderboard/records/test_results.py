@@ -322,7 +322,11 @@ def test_a_file_of_another_version_or_without_a_field_is_refused(tmp_path):
             '"infraction_score":[7]',
             "score.infraction_score: expected a num",
         ),
-        ('"infraction_score":0.7', '"infraction_score":0.8', "score.driving_score: expected 40.0"),
+        (
+            '"infraction_score":0.7',
+            '"infraction_score":0.8',
+            "score.driving_score: 35.0 is not the product",
+        ),
         ('"infraction_score":0.7', '"infraction_score":1e999', "1e999 is too large a number"),
         ('"tick":40', '"tick":18446744073709551616', "is too large a whole number"),
     ],
