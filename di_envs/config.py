@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from di_envs.files.names import check_name as check_name  # from here, too
 from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
@@ -46,19 +46,6 @@ WEATHERS = (
     "DustStorm",
     "Default",
 )
-
-
-def check_name(name: str, known: Iterable[str], what: str) -> None:
-    """Refuses a name that is not known.
-
-    Raises:
-        ValueError: If it is not among `known`; suggests the nearest, and lists all.
-    """
-    names = list(known)
-    if name not in names:
-        near = difflib.get_close_matches(str(name), names, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"Unknown {what} {name!r}; {hint}known: {', '.join(names)}.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ ALLOWED = {
 # "" stands for the modules right in the package.
 FLOORS = {
     "di_envs": (
-        {"numerics"},
+        {"numerics", "files"},
         {"town"},
         {"world"},
         {"rules", "sensors", "actions", "highway"},

@@ -8,7 +8,6 @@ together have the moments asked for.
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing
@@ -29,8 +28,9 @@ from agents.training.frames import (
     DriveLog,
     RecordedDrive,
     read_drive,
+    read_dropped,
     write_drive,
-    write_whole,
+    write_dropped,
 )
 from agents.training.towns import town_files
 from agents.versions import agent_version
@@ -183,7 +183,7 @@ def _remove(outcome: Outcome) -> None:
 def drive_job(job: DriveJob) -> Outcome:
     """Drives, unless that was done before, and writes the drive or why it is dropped."""
     if job.dropped_path.exists():
-        dropped = json.loads(job.dropped_path.read_text())
+        dropped = read_dropped(job.dropped_path)
         _check_same(job.dropped_path, dropped, job)
         return Outcome(job=job, moments=0, why=dropped["why"])
     if job.path.exists():
@@ -192,8 +192,7 @@ def drive_job(job: DriveJob) -> Outcome:
         return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
-        text = json.dumps({"why": why, **_driven_by(job.driver)}) + "\n"
-        write_whole(job.dropped_path, lambda file: file.write(text.encode()))
+        write_dropped(job.dropped_path, why, _driven_by(job.driver))
         return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
     return Outcome(job=job, moments=len(drive), fresh=True)
@@ -314,7 +313,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         drivers[drive.facts.get("driver", EXPERT)] += len(drive)
     dropped = Counter[str]()
     for path in sorted(folder.glob("*/*.dropped.json")):
-        dropped[json.loads(path.read_text())["why"]] += 1
+        dropped[read_dropped(path)] += 1
     return {
         "moments": sum(towns.values()),
         "seconds_apart": FRAME_S,

@@ -27,12 +27,12 @@ from agents.training.frames import (
     DriveStage,
     RecordedDrive,
     read_drive,
-    write_whole,
 )
 from agents.training.towns import load_training_town
 from agents.training.variation import FOURTEEN_WEATHERS
 from agents.training.waypoints import expert_waypoints
 from di_envs.config import check_name
+from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.observer import Observer
 from di_envs.prompt import COMPONENTS

@@ -7,7 +7,6 @@ step), so a run that was killed goes on from its checkpoint as if nothing had be
 from __future__ import annotations
 
 import math
-import os
 import pickle
 import zipfile
 from collections.abc import Iterator
@@ -26,6 +25,7 @@ from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
 from agents.training.samples import Batch, hidden_components
 from di_envs.differences import differences
+from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 
 _PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
@@ -61,18 +61,14 @@ class Training:
         """
         if not self.team.first:
             return
-        part = path.with_suffix(".part")
-        torch.save(
-            {
-                "policy_config": self.policy.config.to_mapping(),
-                "config": self.config.to_mapping(),
-                "policy": self.policy.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
-                "step": self.step,
-            },
-            part,
-        )
-        os.replace(part, path)
+        content = {
+            "policy_config": self.policy.config.to_mapping(),
+            "config": self.config.to_mapping(),
+            "policy": self.policy.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "step": self.step,
+        }
+        write_whole(path, lambda file: torch.save(content, file))
 
     def load(self, path: Path) -> None:
         """Goes on from a checkpoint.

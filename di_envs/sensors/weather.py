@@ -7,7 +7,6 @@ stands in the south-west here. How they look is our own approximation.
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.names import check_name
 from di_envs.numerics.bundles import by_reference
 
 SUN_AZIMUTH_RAD = math.radians(125.0)  # in the world frame: where the sun stands
@@ -107,10 +107,7 @@ def weather_of(weather: str | Weather) -> Weather:
     """
     if isinstance(weather, Weather):
         return weather
-    if weather not in PRESETS:
-        near = difflib.get_close_matches(str(weather), PRESETS, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"Unknown weather {weather!r}; {hint}known: {', '.join(PRESETS)}.")
+    check_name(weather, PRESETS, "weather")
     return PRESETS[weather]
 
 

@@ -7,17 +7,19 @@ be read is no error: the town is parsed again and the file replaced.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-import os
-import tempfile
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from platformdirs import user_cache_path
 
+from di_envs.files.json_values import from_json, parsed
+from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.town.town import Town
 
@@ -42,6 +44,16 @@ READER_MODULES = (
     "reading.stretches",
     "town",
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _About:
+    """What a file holds beside arrays."""
+
+    key: str
+    road_names: tuple[str, ...]
+    junction_names: tuple[str, ...]
+    geo_origin: tuple[float, float]
 
 
 def cache_folder() -> Path:
@@ -76,20 +88,20 @@ def load_cached(town_hash: str, name: str, opendrive: str, folder: Path) -> Town
     try:
         # Opened here: np.load would leave a file open that turns out to be no archive.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = json.loads(str(stored["about"]))
+            about = from_json(_About, parsed(str(stored["about"]), str(path)), str(path))
             arrays = {
                 part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
                 for part, kind in _PARTS.items()
             }
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    if about.get("key") != key:
+    if about.key != key:
         return None
     return Town(
         name=name,
-        road_names=tuple(about["road_names"]),
-        junction_names=tuple(about["junction_names"]),
-        geo_origin=(about["geo_origin"][0], about["geo_origin"][1]),
+        road_names=about.road_names,
+        junction_names=about.junction_names,
+        geo_origin=about.geo_origin,
         content_hash=town_hash,
         opendrive=opendrive,
         **arrays,
@@ -113,17 +125,11 @@ def store(town: Town, folder: Path) -> None:
         for part in _PARTS
         for field, value in getattr(town, part)._asdict().items()
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, suffix=".tmp")
-    except OSError:
-        return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, about=np.array(json.dumps(about)), **arrays)
-        os.replace(temporary, folder / f"{key}.npz")
-    except OSError:
-        Path(temporary).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        write_whole(
+            folder / f"{key}.npz",
+            lambda file: np.savez(file, about=np.array(json.dumps(about)), **arrays),
+        )
 
 
 def freeze(town: Town) -> Town:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, closing
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rich.console import Console
 from rich.table import Table
 
+from di_envs.files.json_values import indented
+from di_envs.files.whole import write_whole
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 
@@ -90,9 +91,7 @@ class Collect:
             card = data_card(self.output)
         except (ValueError, OSError, DriveFileError, SetupError) as error:
             raise UsageError(str(error)) from error
-        text = json.dumps(card, indent=1) + "\n"
-        self.output.mkdir(parents=True, exist_ok=True)
-        (self.output / CARD_FILE).write_text(text, encoding="utf-8")
+        write_whole(self.output / CARD_FILE, indented(card))
         say(f"{card['drives']} drives with {card['moments']} moments, {FRAME_S} s apart.")
         say(f"Weather: {card['weather']}.")
         Console().print(card_table(card))

@@ -5,12 +5,12 @@ The file holds everything it needs, asks for nothing else, and is readable witho
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from string import Template
 from typing import Any
 
+from di_envs.files.whole import write_whole
 from di_envs.town.town import Town
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
 from leaderboard.pages.report_map import map_svg
@@ -94,13 +94,9 @@ def write_report(path: Path, page: str) -> int:
         ReportError: If it cannot be written.
     """
     data = page.encode()
-    beside = path.with_name(f".{path.name}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        os.replace(beside, path)
+        write_whole(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise ReportError(
             f"cannot write {path} ({error.strerror}): choose another --output"
         ) from error

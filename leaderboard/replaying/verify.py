@@ -19,6 +19,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from di_envs.edits.text import EditError
+from di_envs.files.json_values import JsonError, read_json
 from di_envs.route_env import RouteEnv
 from di_envs.rules import rules_named
 from leaderboard.records.carla.results import carla_results
@@ -270,9 +271,9 @@ def _table_problems(run: RunRecord, folder: Path) -> Iterator[str]:
     """How CARLA's file differs from the one that these routes make."""
     path = run_folder(folder) / CARLA_FILE
     try:
-        given = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        yield f"{path} cannot be read ({error})"
+        given = read_json(path)
+    except JsonError as error:
+        yield str(error)
         return
     made = json.loads(json.dumps(carla_results(run)))
     difference = _first_difference("", given, made)
@@ -293,7 +294,7 @@ def _spelling_problems(folder: Path) -> Iterator[str]:
 
         try:
             json.loads(path.read_text(encoding="utf-8"), parse_float=number)
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             continue  # said where it is read
         if odd:
             yield f"{path.name} has {odd[0]}, a number that is written {float(odd[0])!r}"

@@ -7,7 +7,6 @@ ones too, as the two contradict each other otherwise.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -20,8 +19,10 @@ from rich.console import Console
 
 from agents.one_thread import one_thread
 from agents.processes import in_order, processes
+from di_envs.files.json_values import JsonError, one_line, read_json
+from di_envs.files.whole import write_whole
 from leaderboard.records.record import RouteRecord
-from leaderboard.records.results import read_run, replace_file
+from leaderboard.records.results import read_run
 from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.episode import close_agent
@@ -144,15 +145,14 @@ def _keep(folder: Path, record: RouteRecord, rows: Sequence[Sequence[float]]) ->
             for place, target in enumerate(TARGETS)
         },
     }
-    (folder / FOLDER).mkdir(exist_ok=True)
-    replace_file(_path(folder, record), json.dumps(content, allow_nan=False) + "\n")
+    write_whole(_path(folder, record), one_line(content))
 
 
 def _kept(folder: Path, record: RouteRecord) -> Lengths | None:
     """What was asked of a drive before; None if nothing, or of another drive."""
     try:
-        content = json.loads(_path(folder, record).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(_path(folder, record))
+    except JsonError:
         return None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         return None

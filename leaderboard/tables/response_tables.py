@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from agents.explain.situations import SAYS
+from di_envs.files.json_values import indented
+from di_envs.files.whole import write_whole
 from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
 from leaderboard.responding.drive_responses import DriveResponses, plain_words
@@ -34,11 +35,10 @@ def write_tables(
     Raises:
         OSError: If they cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     text, numbers = folder / "responses.md", folder / "responses.json"
-    text.write_text("\n".join(table.markdown() for table in tables), encoding="utf-8")
+    write_whole(text, "\n".join(table.markdown() for table in tables))
     values = response_values(drives, examined(drives), head_consistency(drives))
-    numbers.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(numbers, indented(values))
     return text, numbers
 
 

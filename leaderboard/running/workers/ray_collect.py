@@ -17,9 +17,9 @@ from typing import Any
 
 from agents.processes import Pending, Pool
 from agents.training.collect import DriveJob, Outcome
-from agents.training.frames import write_whole
 from agents.versions import agent_version
 from di_envs.differences import differences
+from di_envs.files.whole import write_whole
 from leaderboard.records.footing import footing_here
 from leaderboard.running.jobs import SetupError
 from leaderboard.running.workers.ray_engine import cluster
@@ -72,7 +72,7 @@ class RayPending:
         job = driven.outcome.job
         check_footing(driven.footing, footing_of_driver(job.driver))
         path = job.dropped_path if driven.outcome.why else job.path
-        write_whole(path, lambda file: file.write(driven.content))
+        write_whole(path, driven.content)
         return driven.outcome
 
     def cancel(self) -> bool:

@@ -19,7 +19,15 @@ from agents.training.collect import (
     drive_paths,
     without_standing_tail,
 )
-from agents.training.frames import DriveFileError, DriveLog, DriveStage, read_drive, write_drive
+from agents.training.frames import (
+    DriveFileError,
+    DriveLog,
+    DriveStage,
+    read_drive,
+    read_dropped,
+    write_drive,
+    write_dropped,
+)
 from agents.training.towns import town_files
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
@@ -179,6 +187,16 @@ def test_collecting_gives_the_same_files_stopped_or_not_with_one_process_or_two(
     assert card["moments"] == sum(outcome.moments for outcome in outcomes) >= 400
     assert card["by_town"] == {"small_grid": card["moments"]}
     assert sum(card["by_command"].values()) == card["moments"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"why": 3}', "[" * 100_000], ids=len)
+def test_a_garbled_reason_for_a_dropped_drive_says_what_to_do(tmp_path, text):
+    path = tmp_path / "a.dropped.json"
+    write_dropped(path, "red light")
+    assert read_dropped(path) == "red light"
+    path.write_text(text)
+    with pytest.raises(DriveFileError, match=r"a\.dropped\.json does not say why .*run collect"):
+        read_dropped(path)
 
 
 def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monkeypatch):

@@ -91,7 +91,7 @@ def test_a_damaged_cache_file_is_replaced(tmp_path, damage):
         )
     assert same(parsed, load_town("toy", cache_folder=tmp_path))
     assert path.is_dir() or path.read_bytes() == content
-    assert not list(tmp_path.glob("*.tmp"))
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path):
