@@ -1,16 +1,70 @@
-"""What tests of several folders share."""
+"""What tests of several folders share: the classes of tests, kernels made beforehand, a folder.
+
+A test is fast unless it says otherwise: `tests/slow.txt` lists what takes more than a second, and
+`tests/full.txt` what only `just full` runs. Both name files, or tests within files.
+"""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
+
+from tests import kernels_first
+
+TESTS = Path(__file__).resolve().parent
+LISTED = ("slow", "full")  # each a mark, and a file of tests that have it
+FAST_S = 2.0  # what a fast test may take before the end of a run names it; twice what is meant
+
+
+def listed(mark: str) -> frozenset[str]:
+    """The files and tests that have a mark by its list, as pytest names them."""
+    lines = (TESTS / f"{mark}.txt").read_text(encoding="utf-8").splitlines()
+    return frozenset(line for line in lines if line and not line.startswith("#"))
+
+
+def names_of(item: pytest.Item) -> tuple[str, str]:
+    """What a list may call a test by: its file, and itself without its parameters."""
+    file = item.nodeid.partition("::")[0]
+    return file, item.nodeid.partition("[")[0]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks what the lists name, and as fast whatever is neither slow nor full."""
+    lists = {mark: listed(mark) for mark in LISTED}
+    for item in items:
+        for mark, names in lists.items():
+            if not names.isdisjoint(names_of(item)):
+                item.add_marker(mark)
+        if not any(item.get_closest_marker(mark) for mark in LISTED):
+            item.add_marker("fast")
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compiles kernels before the first test, if any test that was chosen has loaded them."""
+    if session.items and not session.config.option.collectonly:
+        if "di_envs.numerics.kernels" in sys.modules:
+            kernels_first.compile_kernels(session.config)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Names fast tests that were not, as lines for the list; a busy machine may be why."""
+    took: dict[str, float] = {}
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            if isinstance(report, pytest.TestReport) and "fast" in report.keywords:
+                took[report.nodeid] = took.get(report.nodeid, 0.0) + report.duration
+    late = sorted({name.partition("[")[0] for name, spent_s in took.items() if spent_s > FAST_S})
+    if late:
+        terminalreporter.section(f"marked fast, took over {FAST_S:g} s: lines for tests/slow.txt")
+        terminalreporter.write_line("\n".join(late))
 
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of reference data beside the checkout; tests that need it skip without."""
-    folder = Path(__file__).resolve().parents[2] / "shared"
+    folder = TESTS.parents[1] / "shared"
     if not (folder / "data").is_dir():
         pytest.skip(f"no reference data at {folder / 'data'}")
     return folder

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from agents.training.towns import TRAINING_TOWNS, load_training_town, town_files
+from di_envs.numerics.kernels import kernel_cache
 from di_envs.town.lanes import SignalKind
 from di_envs.town.loading import load_town
 
@@ -40,6 +41,8 @@ def ends_of(lanes):
 
 
 def test_another_process_with_an_empty_cache_makes_the_same_files(tmp_path):
+    (tmp_path / "driveinsight").mkdir()
+    (tmp_path / "driveinsight" / "kernels").symlink_to(kernel_cache())  # empty but for these
     code = "from agents.training.towns import town_files; print(town_files('small_grid').folder)"
     done = subprocess.run(
         [sys.executable, "-c", code],
