@@ -6,7 +6,9 @@ A test is fast unless it says otherwise: `tests/slow.txt` lists what takes more 
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,7 @@ from tests import kernels_first
 TESTS = Path(__file__).resolve().parent
 LISTED = ("slow", "full")  # each a mark, and a file of tests that have it
 FAST_S = 2.0  # what a fast test may take before the end of a run names it; twice what is meant
+LATE = pytest.StashKey[list[str]]()
 
 
 def listed(mark: str) -> frozenset[str]:
@@ -30,6 +33,7 @@ def names_of(item: pytest.Item) -> tuple[str, str]:
     return file, item.nodeid.partition("[")[0]
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks what the lists name, and as fast whatever is neither slow nor full."""
     lists = {mark: listed(mark) for mark in LISTED}
@@ -48,17 +52,27 @@ def pytest_collection_finish(session: pytest.Session) -> None:
             kernels_first.compile_kernels(session.config)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Notes fast tests that are not, by processor time: on a busy machine all take long."""
+    before_s = processor_s()
+    result = yield
+    if item.get_closest_marker("fast") and processor_s() - before_s > FAST_S:
+        item.config.stash.setdefault(LATE, []).append(names_of(item)[1])
+    return result
+
+
+def processor_s() -> float:
+    """What this process has used of processors, and those that it started and that ended."""
+    return sum(os.times()[:4])
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Names fast tests that were not, as lines for the list; a busy machine may be why."""
-    took: dict[str, float] = {}
-    for reports in terminalreporter.stats.values():
-        for report in reports:
-            if isinstance(report, pytest.TestReport) and "fast" in report.keywords:
-                took[report.nodeid] = took.get(report.nodeid, 0.0) + report.duration
-    late = sorted({name.partition("[")[0] for name, spent_s in took.items() if spent_s > FAST_S})
+    """Names fast tests that were not, as lines for the list."""
+    late = terminalreporter.config.stash.get(LATE, [])
     if late:
         terminalreporter.section(f"marked fast, took over {FAST_S:g} s: lines for tests/slow.txt")
-        terminalreporter.write_line("\n".join(late))
+        terminalreporter.write_line("\n".join(sorted(set(late))))
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,10 +15,12 @@ from di_envs.numerics.kernels import kernel_cache
 from di_envs.town.lanes import SignalKind
 from di_envs.town.loading import load_town
 
+loaded = cache(load_training_town)  # a second each
+
 
 @pytest.mark.parametrize("name", TRAINING_TOWNS)
 def test_each_town_has_junctions_with_lights_and_signs_routes_and_triggers(name):
-    town, plans = load_training_town(name)
+    town, plans = loaded(name)
     kinds = set(town.signals.kind.tolist())
     assert {int(SignalKind.LIGHT), int(SignalKind.STOP)} <= kinds
     assert len(set(town.lanes.junction[town.lanes.junction >= 0].tolist())) >= 4
@@ -29,7 +32,7 @@ def test_each_town_has_junctions_with_lights_and_signs_routes_and_triggers(name)
 def test_no_lane_of_a_training_town_lies_where_one_of_town05_does():
     theirs = load_town("town05").lanes
     for name in TRAINING_TOWNS:
-        ours = load_training_town(name)[0].lanes
+        ours = loaded(name)[0].lanes
         apart_m = np.linalg.norm(ends_of(ours)[:, None] - ends_of(theirs)[None], axis=2).max(axis=2)
         assert apart_m.min() > 1.0, name
 
