@@ -7,7 +7,7 @@ python := "python"
 default:
     @just --list --unsorted
 
-# Tests of a second or less, of every package: under two minutes
+# Tests of half a second or less, of every package: under two minutes
 fast *options:
     {{python}} -m pytest -m fast {{options}}
 

@@ -1,7 +1,7 @@
 """What tests of several folders share: the classes of tests, kernels made beforehand, a folder.
 
-A test is fast unless it says otherwise: `tests/slow.txt` lists what takes more than a second, and
-`tests/full.txt` what only `just full` runs. Both name files, or tests within files.
+A test is fast unless it says otherwise: `tests/slow.txt` lists what takes more than half a second
+with all its cases, `tests/full.txt` what only `just full` runs; both name files, or tests in them.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from tests import kernels_first
 
 TESTS = Path(__file__).resolve().parent
 LISTED = ("slow", "full")  # each a mark, and a file of tests that have it
-FAST_S = 2.0  # what a fast test may take before the end of a run names it; twice what is meant
-LATE = pytest.StashKey[list[str]]()
+FAST_S = 1.0  # of a processor: beyond it the end of a run names a fast test; twice what is meant
+SPENT_S = pytest.StashKey[dict[str, float]]()  # on each fast test, with all its cases
 
 
 def listed(mark: str) -> frozenset[str]:
@@ -54,11 +54,12 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Notes fast tests that are not, by processor time: on a busy machine all take long."""
+    """Notes what fast tests take, by processor time: on a busy machine all take long."""
     before_s = processor_s()
     result = yield
-    if item.get_closest_marker("fast") and processor_s() - before_s > FAST_S:
-        item.config.stash.setdefault(LATE, []).append(names_of(item)[1])
+    if item.get_closest_marker("fast"):
+        spent_s, name = item.config.stash.setdefault(SPENT_S, {}), names_of(item)[1]
+        spent_s[name] = spent_s.get(name, 0.0) + processor_s() - before_s
     return result
 
 
@@ -69,10 +70,11 @@ def processor_s() -> float:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Names fast tests that were not, as lines for the list."""
-    late = terminalreporter.config.stash.get(LATE, [])
+    spent_s = terminalreporter.config.stash.get(SPENT_S, {})
+    late = sorted(name for name, spent in spent_s.items() if spent > FAST_S)
     if late:
         terminalreporter.section(f"marked fast, took over {FAST_S:g} s: lines for tests/slow.txt")
-        terminalreporter.write_line("\n".join(sorted(set(late))))
+        terminalreporter.write_line("\n".join(late))
 
 
 @pytest.fixture(scope="session")
