@@ -16,7 +16,7 @@ FILES = sorted(TESTS.rglob("test_*.py"))
 # Folders that a fast test runs without importing from them or standing beside them
 RUN_BY = {
     "leaderboard/envs": "tests/agents/carla/test_carla.py",
-    "leaderboard/running/displays": "tests/leaderboard/running/test_runner.py",
+    "leaderboard/running/displays": "tests/leaderboard/commands/test_cli.py",
 }
 
 
