@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,8 @@ from gymnasium import spaces
 from rich.console import Console
 
 from agents import load_agent
-from di_envs.edits.text import EditError, read_edit
+from agents.base import Agent
+from di_envs.edits.text import EditError
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
 from leaderboard.records.record import RouteRecord, RunRecord
@@ -29,11 +30,7 @@ from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.study import StudyDisplay
 from leaderboard.running.episode import close_agent
 from leaderboard.running.interruption import interruptible
-from leaderboard.running.interventions import (
-    check_interventions,
-    read_interventions,
-    sort_interventions,
-)
+from leaderboard.running.interventions import check_interventions, sort_interventions, texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
 from leaderboard.running.messages import Scene
 from leaderboard.running.runner import Existing, evaluate, new_run
@@ -53,6 +50,7 @@ from leaderboard.studies.rows import (
 )
 from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, as_read, read_study
+from wrappers.interventions.edit import ObservationEdit
 from wrappers.interventions.layout import SHORT_NAMES
 
 ROWS_FOLDER = "rows"
@@ -132,40 +130,39 @@ def _earlier(folder: Path) -> Study | None:
 def _look(plan: StudyPlan) -> tuple[Scene, dict[str, str]]:
     """What there is to drive, and by row why it makes no sense for this agent."""
     driver = set_up(plan.spec, Stopwatch())
-    with driver:
-        reads, reasons = _read_components(plan.spec.agent), {}
-        space = driver.env.observation_space
+    agent = load_agent(plan.spec.agent)
+    with driver, ExitStack() as closing:
+        closing.callback(close_agent, agent)
+        reads, reasons = _read_components(agent), {}
+        space: Any = driver.env.observation_space
         for row in plan.rows:
             try:
-                texts = read_interventions(row.edit)
-                reasons[row.name] = _unread(texts, reads, space)
+                reasons[row.name] = _unread(row.edits, reads, space)
                 if reasons[row.name]:
                     continue
-                edits = sort_interventions(texts, space)
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", UserWarning)  # one is enough: the null row's
-                    check_interventions(edits, plan.spec.agent, space, driver.requires)
+                    check_interventions(
+                        sort_interventions(row.edits, space), agent, plan.spec.agent
+                    )
             except EditError as error:
                 reasons[row.name] = str(error)
-        null = sort_interventions(read_interventions(NULL_ROW.edit), space)
-        check_interventions(null, plan.spec.agent, space, driver.requires)
+        check_interventions(sort_interventions(NULL_ROW.edits, space), agent, plan.spec.agent)
         return scene_of(driver), reasons
 
 
-def _read_components(spec: str) -> frozenset[str] | None:
+def _read_components(agent: Agent[Any]) -> frozenset[str] | None:
     """The components that an agent's policy reads, if it says so; None if it does not."""
-    agent = load_agent(spec)
-    try:
-        offered = getattr(agent, "explainable", None)
-        return None if offered is None else frozenset(offered().anatomy.groups)
-    finally:
-        close_agent(agent)
+    offered = getattr(agent, "explainable", None)
+    return None if offered is None else frozenset(offered().anatomy.groups)
 
 
-def _unread(texts: Sequence[str], reads: frozenset[str] | None, space: spaces.Space[Any]) -> str:
+def _unread(
+    edits: Sequence[ObservationEdit], reads: frozenset[str] | None, space: spaces.Space[Any]
+) -> str:
     """Why edits cannot change what the agent does; empty if they may."""
-    for text in texts:
-        for target in read_edit(text).target.split("+"):
+    for edit in edits:
+        for target in edit.targets:
             name = SHORT_NAMES.get(target, target)
             if name == ODOMETRY and isinstance(space, spaces.Dict) and name not in space.spaces:
                 return "the agent sees no odometry"
@@ -189,7 +186,8 @@ class _Driving:
         self._plan, self._scene, self._folder = plan, scene, folder
         self._seeds = seeds
         self._head = study_of(plan.kind, self._run_head(BASELINE_ROW, range(seeds)), ())
-        self._head = dataclasses.replace(self._head, interventions=plan.spec.interventions)
+        shared = texts_of(plan.spec.interventions)
+        self._head = dataclasses.replace(self._head, interventions=shared)
         if earlier is not None:
             _check_same(folder, earlier, self._head)
             if len(earlier.seeds) > seeds:
@@ -296,7 +294,7 @@ class _Driving:
         return new_run(self._spec(row), jobs, self._plan.suite, self._scene)
 
     def _spec(self, row: Row) -> RunSpec:
-        edits = (*self._plan.spec.interventions, *_texts(row))
+        edits = (*self._plan.spec.interventions, *row.edits)
         return dataclasses.replace(self._plan.spec, interventions=edits)
 
     def _row_folder(self, row: Row) -> Path:
@@ -313,10 +311,6 @@ class _Driving:
             except DamagedError:
                 seeds = range(self._seeds)
         return resumed(folder, self._run_head(row, seeds))
-
-
-def _texts(row: Row) -> tuple[str, ...]:
-    return read_interventions(row.edit) if row.edit else ()
 
 
 def _bits(record: RouteRecord) -> object:

@@ -15,8 +15,9 @@ from leaderboard.explaining.route import explain_route
 from leaderboard.pages.explain_tables import path_moves_m
 from leaderboard.records.chosen_route import RouteChoiceError
 from leaderboard.replaying.branch import branch, branch_run
+from leaderboard.replaying.recorded_agent import RetraceError, retrace_env, run_agent
 from leaderboard.replaying.replay import ReplayError
-from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.untrained import save_untrained
 
