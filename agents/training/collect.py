@@ -313,7 +313,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         drivers[drive.facts.get("driver", EXPERT)] += len(drive)
     dropped = Counter[str]()
     for path in sorted(folder.glob("*/*.dropped.json")):
-        dropped[read_dropped(path)] += 1
+        dropped[read_dropped(path)["why"]] += 1
     return {
         "moments": sum(towns.values()),
         "seconds_apart": FRAME_S,

@@ -113,8 +113,8 @@ class Respond:
     ) -> list[DriveResponses]:
         """Responses of every drive, behind a bar that counts seconds of driving."""
         from agents.explain.protocol import NotExplainableError
+        from leaderboard.replaying.recorded_agent import RetraceError
         from leaderboard.replaying.replay import ReplayError
-        from leaderboard.replaying.retracing import RetraceError
         from leaderboard.responding.measuring import measured
         from leaderboard.running.compiling import compile_progress
 

@@ -31,7 +31,7 @@ from leaderboard.pages.town_svg import town_svg
 from leaderboard.records.blocks import Column, write_block
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import RunRecord
-from leaderboard.replaying.retracing import FRONT
+from leaderboard.running.front_camera import FRONT
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-explanation", 1
 SCRIPTS = (

@@ -203,7 +203,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
         versions=scene.versions,
         cpu=scene.cpu,
         planned=len(jobs),
-        interventions=spec.interventions,
+        interventions=tuple(map(str, spec.interventions)),
     )
 
 

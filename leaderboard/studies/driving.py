@@ -24,7 +24,7 @@ from leaderboard.records.resuming import resumed
 from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.study import StudyDisplay
 from leaderboard.running.interruption import interruptible
-from leaderboard.running.interventions import read_interventions
+from leaderboard.running.interventions import texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
 from leaderboard.running.messages import Scene
 from leaderboard.running.runner import Existing, evaluate, new_run
@@ -125,7 +125,8 @@ class _Driving:
         self._plan, self._scene, self._folder = plan, scene, folder
         self._seeds = seeds
         self._head = study_of(plan.kind, self._run_head(BASELINE_ROW, range(seeds)), ())
-        self._head = dataclasses.replace(self._head, interventions=plan.spec.interventions)
+        shared = texts_of(plan.spec.interventions)
+        self._head = dataclasses.replace(self._head, interventions=shared)
         if earlier is not None:
             _check_same(folder, earlier, self._head)
             if len(earlier.seeds) > seeds:
@@ -232,7 +233,7 @@ class _Driving:
         return new_run(self._spec(row), jobs, self._plan.suite, self._scene)
 
     def _spec(self, row: Row) -> RunSpec:
-        edits = (*self._plan.spec.interventions, *_texts(row))
+        edits = (*self._plan.spec.interventions, *row.edits)
         return dataclasses.replace(self._plan.spec, interventions=edits)
 
     def _row_folder(self, row: Row) -> Path:
@@ -249,10 +250,6 @@ class _Driving:
             except DamagedError:
                 seeds = range(self._seeds)
         return resumed(folder, self._run_head(row, seeds))
-
-
-def _texts(row: Row) -> tuple[str, ...]:
-    return read_interventions(row.edit) if row.edit else ()
 
 
 def _bits(record: RouteRecord) -> object:

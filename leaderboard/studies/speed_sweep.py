@@ -23,9 +23,11 @@ from di_envs.files.json_values import JsonError, one_line, read_json
 from di_envs.files.whole import write_whole
 from leaderboard.records.record import RouteRecord
 from leaderboard.records.results import read_run
-from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
+from leaderboard.replaying.recorded_agent import retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.episode import close_agent
+from leaderboard.running.interventions import seen_space
 from leaderboard.statistics.bootstrap import expanded_interval
 from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
 from leaderboard.studies import StudyError
@@ -33,6 +35,7 @@ from leaderboard.studies.effects import ALPHA, Effect, effect
 from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
 from wrappers.interventions.editing import ObservationEditing
+from wrappers.interventions.values import SetValue
 
 DOSES_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0)
 TARGETS = ("speed", "speed+speed_history")
@@ -89,16 +92,18 @@ def ask_about(folder: Path, index: int) -> None:
     import torch
 
     from agents.explain.protocol import NotExplainableError, explainable
+    from leaderboard.replaying.recorded_agent import RetraceError
     from leaderboard.replaying.replay import ReplayError
-    from leaderboard.replaying.retracing import RetraceError
 
     run = read_run(folder / "rows" / "baseline")
     record = next(record for record in run.routes if record.index == index)
     env = retrace_env(run)
     agent = run_agent(run, env)
-    space = own_space(run, env)
+    space = seen_space(run.requires["observations"], env.config)
     edits = {
-        (target, dose): ObservationEditing(f"set:{target}={dose:g}", space)
+        (target, dose): ObservationEditing(
+            (SetValue(targets=tuple(target.split("+")), number=dose),), space
+        )
         for target in TARGETS
         for dose in DOSES_MPS
     }

@@ -11,6 +11,7 @@ from di_envs.rules import rules_named
 from di_envs.suites import load_suite
 from leaderboard.records.record import RunRecord
 from leaderboard.running.episode import drive_route
+from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.runner import new_run
 from leaderboard.running.setting_up import scene_of, set_up
@@ -30,7 +31,8 @@ def short_run(
     """A run of the first decisions of one route, the suite's first where none is named."""
     route_id = route_id or load_suite(suite).specs()[0].route_id
     options = {"suite": suite, "route_ids": (route_id,), **options}
-    spec = RunSpec(agent=agent, options=options, interventions=interventions)
+    edits = read_interventions("; ".join(interventions))
+    spec = RunSpec(agent=agent, options=options, interventions=edits)
     job = Job(index=0, route_id=route_id, seed=seed)
     with set_up(spec, Stopwatch()) as driver:
         scene = scene_of(driver)
