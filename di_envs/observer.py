@@ -38,7 +38,7 @@ from di_envs.world.world import WorldView
 
 
 @by_reference
-class Sight(NamedTuple):
+class ObservationParts(NamedTuple):
     """All that one look at the world reads and writes: one argument, as each costs time."""
 
     state: State
@@ -53,7 +53,9 @@ class Sight(NamedTuple):
 
 
 @kernel
-def fill_observation(sight: Sight, ego: int, with_prompt: bool, with_inertial: bool) -> None:
+def fill_observation(
+    sight: ObservationParts, ego: int, with_prompt: bool, with_inertial: bool
+) -> None:
     """Writes the groups that are asked for, for one ego."""
     if with_prompt:
         fill_prompt(sight.state, sight.route, sight.stop_lines, sight.chunks, ego, sight.prompt)
@@ -126,7 +128,7 @@ class Observer:
 
     def start(self, view: WorldView) -> None:
         """Takes up an episode: the view's state arrays and the ego's plan."""
-        self._sight = Sight(
+        self._sight = ObservationParts(
             state=view.state,
             route=prompt_route_of(view.plans[self._ego]),
             stop_lines=self._stop_lines,

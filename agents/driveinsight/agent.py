@@ -21,7 +21,7 @@ from agents.driveinsight.explained import ExplainedAgent
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
-from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
+from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
 from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
 from agents.one_thread import one_thread
@@ -125,7 +125,7 @@ class DriveInsightAgent:
         self, observation: Observation, memory: DriveInsightMemory
     ) -> tuple[Inputs, Output]:
         inputs = inputs_of(self.policy.config, observation)
-        moment = Moment(
+        moment = DecisionMoment(
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
         with editing(self.policy, tap_edits(self._edits, moment)):

@@ -36,7 +36,7 @@ _MOST = {"": 0.0, "p": 1.0, "sigma": float("inf")}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
+class DecisionMoment:
     """What draws are keyed by, and what conditions ask about.
 
     Attributes:
@@ -95,7 +95,7 @@ class TapEdit:
             for tap in (_tap(target, text, policy) for target in text.target.split("+"))
         )
 
-    def at(self, moment: Moment) -> Edit:
+    def at(self, moment: DecisionMoment) -> Edit:
         """What it does to an activation at a moment."""
 
         def edit(activation: Tensor) -> Tensor:
@@ -111,7 +111,7 @@ class TapEdit:
 
         return edit
 
-    def _kept(self, moment: Moment, activation: Tensor) -> Tensor:
+    def _kept(self, moment: DecisionMoment, activation: Tensor) -> Tensor:
         """1 or 0 for each cell of a (B, C, X, Y) map, or each row of another activation."""
         shape = activation.shape
         part = (shape[0], *shape[2:]) if len(shape) == 4 else shape[:-1]
@@ -119,12 +119,12 @@ class TapEdit:
         kept = _like(drawn >= self.amount, activation)
         return kept[:, None] if len(shape) == 4 else kept[..., None]
 
-    def _noise(self, moment: Moment, activation: Tensor) -> Tensor:
+    def _noise(self, moment: DecisionMoment, activation: Tensor) -> Tensor:
         shape = tuple(activation.shape)
         return _like(keyed_normals(moment.seed, self.stream, moment.decision, shape), activation)
 
 
-def tap_edits(edits: Sequence[TapEdit], moment: Moment) -> dict[str, Edit]:
+def tap_edits(edits: Sequence[TapEdit], moment: DecisionMoment) -> dict[str, Edit]:
     """Functions for `taps.editing`: of each tap, those edits that hold, one after the other."""
     chains: dict[str, list[Edit]] = {}
     for edit in edits:

@@ -16,7 +16,7 @@ from agents.explain.responses import Response, group_taps, response_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class DecisionLook:
     """All that is seen of one decision.
 
     Attributes:
@@ -28,7 +28,7 @@ class Look:
     maps: Mapping[str, NDArray[np.float32]]
 
 
-def look_at(agent: Agent[Any], observation: Observation, memory: Any) -> Look:
+def look_at(agent: Agent[Any], observation: Observation, memory: Any) -> DecisionLook:
     """Looks at one decision; arguments and errors are those of `differentiate_agent`."""
     anatomy, passed = differentiate_agent(agent, observation, memory, group_taps, map_taps)
-    return Look(response=response_of(anatomy, passed), maps=maps_of(anatomy, passed))
+    return DecisionLook(response=response_of(anatomy, passed), maps=maps_of(anatomy, passed))

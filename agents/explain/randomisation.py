@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from torch import nn
 
 from agents.base import Agent, Observation
-from agents.explain.look import Look, look_at
+from agents.explain.look import DecisionLook, look_at
 from agents.explain.protocol import explainable
 from di_envs.config import check_name
 
@@ -116,7 +116,7 @@ def _ranks(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return ranks
 
 
-def _compared(parts: tuple[str, ...], before: Look, after: Look) -> Randomised:
+def _compared(parts: tuple[str, ...], before: DecisionLook, after: DecisionLook) -> Randomised:
     moved = after.response.waypoints.mean(axis=0) - before.response.waypoints.mean(axis=0)
     return Randomised(
         parts=parts,

@@ -82,7 +82,7 @@ PRESETS = {
 
 
 @by_reference
-class Look(NamedTuple):
+class WeatherLook(NamedTuple):
     """How a weather looks, as cameras need it. Colours are shares of full brightness."""
 
     sun: NDArray[np.float32]  # (3,) towards the sun
@@ -111,7 +111,7 @@ def weather_of(weather: str | Weather) -> Weather:
     return PRESETS[weather]
 
 
-def look_of(weather: Weather) -> Look:
+def look_of(weather: Weather) -> WeatherLook:
     """The light of a weather."""
     cloud = weather.cloudiness / 100.0
     rain = weather.precipitation / 100.0
@@ -144,7 +144,7 @@ def look_of(weather: Weather) -> Look:
         horizon = np.array([0.055, 0.060, 0.085]) + 0.02 * cloud
     haze = 1.0 / 700.0 + rain / 260.0 + weather.dust / 100.0 / 45.0
     haze += weather.fog / 100.0 / (300.0 if night else 60.0)
-    return Look(
+    return WeatherLook(
         sun=np.array(sun, np.float32),
         sun_colour=(clear_sun * direct).astype(np.float32),
         ambient=shade.astype(np.float32),

@@ -16,7 +16,7 @@ from leaderboard.replaying.film import Film
 from leaderboard.replaying.futures import Future
 
 if TYPE_CHECKING:
-    from agents.explain.look import Look
+    from agents.explain.look import DecisionLook
 
 
 class ExplainError(Exception):
@@ -52,7 +52,7 @@ class Answer:
 
     edit: str
     control: NDArray[np.float32] | None
-    look: Look | None
+    look: DecisionLook | None
     future: Future
 
 

@@ -21,7 +21,7 @@ from leaderboard.replaying.retracing import Decision
 from leaderboard.running.front_camera import FRONT, front_camera
 
 if TYPE_CHECKING:
-    from agents.explain.look import Look
+    from agents.explain.look import DecisionLook
     from agents.explain.protocol import FeatureMap
 
 JPEG_QUALITY = 72
@@ -50,7 +50,7 @@ class DriveLooks:
         self._poses: list[tuple[float, float, float]] = []
         self._controls: list[NDArray[np.float32]] = []
         self._images: list[bytes] = []
-        self._looks: list[Look] = []
+        self._looks: list[DecisionLook] = []
         self._seen: dict[str, list[Any]] = {}
         self.problem = _why_not(run, agent)
 
@@ -74,7 +74,7 @@ class DriveLooks:
         look = self.look(self.agent, decision.seen, decision.memory)
         self._looks += [] if look is None else [look]
 
-    def look(self, agent: Agent[Any], seen: Observation, memory: Any) -> Look | None:
+    def look(self, agent: Agent[Any], seen: Observation, memory: Any) -> DecisionLook | None:
         """What is seen of a decision inside the policy."""
         if self.problem:
             return None

@@ -11,7 +11,7 @@ from leaderboard.running.jobs import Job
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class RunFacts:
     """What a worker learns of a run before it drives, and what machine it is on."""
 
     requires: Requirements
@@ -28,7 +28,7 @@ class Scene:
 class Ready:
     """A worker is ready to drive. From an engine: the first is, and jobs may be given to it."""
 
-    scene: Scene
+    scene: RunFacts
 
 
 @dataclass(frozen=True, kw_only=True)

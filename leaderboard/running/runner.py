@@ -32,7 +32,7 @@ from leaderboard.running.messages import (
     EngineEvent,
     Lost,
     Ready,
-    Scene,
+    RunFacts,
     Started,
     Warned,
 )
@@ -145,7 +145,7 @@ class _Evaluation:
             case Warned(text=text):
                 warnings.warn(text, stacklevel=2)
 
-    def _begin(self, scene: Scene) -> None:
+    def _begin(self, scene: RunFacts) -> None:
         jobs = plan_jobs(scene.route_ids, self._seeds)
         run = new_run(self._spec, jobs, self._suite, scene)
         if self._resume:
@@ -178,7 +178,7 @@ def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
     return dataclasses.replace(lost_record(job, reason), status=status)
 
 
-def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> RunRecord:
+def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -> RunRecord:
     """A run of which nothing is driven yet."""
     requires = scene.requires
     return RunRecord(

@@ -15,7 +15,7 @@ from leaderboard.running.episode import close_agent, describe
 from leaderboard.running.finished_route import route_hash
 from leaderboard.running.interventions import check_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.messages import Scene
+from leaderboard.running.messages import RunFacts
 from leaderboard.running.wall_clock import Doing, Stopwatch
 
 
@@ -77,13 +77,13 @@ def made_agent(spec: str) -> tuple[Agent[Any], Requirements]:
         raise SetupError(f"agent '{spec}' cannot be made: {describe(error)}") from error
 
 
-def scene_of(driver: Driver) -> Scene:
+def run_facts(driver: Driver) -> RunFacts:
     """What there is to drive, and with what."""
     town = driver.env.view.town
     routes = hashlib.blake2b(digest_size=16)
     for plan in driver.env.plans:
         routes.update(f"{plan.route_id}\0{route_hash(plan)}\0".encode())
-    return Scene(
+    return RunFacts(
         requires=driver.requires,
         agent_version=agent_version(driver.spec.agent),
         town=town.name,

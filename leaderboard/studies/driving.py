@@ -26,7 +26,7 @@ from leaderboard.running.displays.study import StudyDisplay
 from leaderboard.running.interruption import interruptible
 from leaderboard.running.interventions import texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
-from leaderboard.running.messages import Scene
+from leaderboard.running.messages import RunFacts
 from leaderboard.running.runner import Existing, evaluate, new_run
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
 from leaderboard.studies import StudyError
@@ -116,7 +116,7 @@ class _Driving:
     def __init__(
         self,
         plan: StudyPlan,
-        scene: Scene,
+        scene: RunFacts,
         reasons: dict[str, str],
         folder: Path,
         earlier: Study | None,

@@ -15,15 +15,15 @@ from di_envs.edits.text import EditError
 from leaderboard.running.episode import close_agent
 from leaderboard.running.interventions import check_interventions, sort_interventions
 from leaderboard.running.jobs import RunSpec
-from leaderboard.running.messages import Scene
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.messages import RunFacts
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.studies.rows import COMPONENTS, NULL_ROW, ODOMETRY, Row
 from wrappers.interventions.edit import ObservationEdit
 from wrappers.interventions.layout import SHORT_NAMES
 
 
-def look_ahead(spec: RunSpec, rows: Sequence[Row]) -> tuple[Scene, dict[str, str]]:
+def look_ahead(spec: RunSpec, rows: Sequence[Row]) -> tuple[RunFacts, dict[str, str]]:
     """What there is to drive, and by row why it makes no sense for this agent."""
     driver = set_up(spec, Stopwatch())
     agent = load_agent(spec.agent)
@@ -42,7 +42,7 @@ def look_ahead(spec: RunSpec, rows: Sequence[Row]) -> tuple[Scene, dict[str, str
             except EditError as error:
                 reasons[row.name] = str(error)
         check_interventions(sort_interventions(NULL_ROW.edits, space), agent, spec.agent)
-        return scene_of(driver), reasons
+        return run_facts(driver), reasons
 
 
 def _read_components(agent: Agent[Any]) -> frozenset[str] | None:

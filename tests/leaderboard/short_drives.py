@@ -14,7 +14,7 @@ from leaderboard.running.episode import drive_route
 from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.runner import new_run
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 
 
@@ -35,7 +35,7 @@ def short_run(
     spec = RunSpec(agent=agent, options=options, interventions=edits)
     job = Job(index=0, route_id=route_id, seed=seed)
     with set_up(spec, Stopwatch()) as driver:
-        scene = scene_of(driver)
+        scene = run_facts(driver)
         record = drive_route(
             driver.interventions.around(TimeLimit(driver.env, decisions)),
             lambda: driver.interventions.agent(agent),

@@ -13,7 +13,7 @@ from di_envs.sensors.camera.config import CameraConfig, Rig
 from di_envs.sensors.camera.projection import Camera, Projected
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.scene.scene import Scene
-from di_envs.sensors.weather import Look
+from di_envs.sensors.weather import WeatherLook
 from di_envs.world.state import State
 
 
@@ -47,7 +47,7 @@ class Studio(NamedTuple):
 
     state: State
     scene: Scene
-    look: Look
+    look: WeatherLook
     boxes: Boxes
     seen: Projected
 

@@ -21,7 +21,7 @@ from di_envs.sensors.camera.spans import (
     windows,
 )
 from di_envs.sensors.scene.boxes import Material
-from di_envs.sensors.weather import Look
+from di_envs.sensors.weather import WeatherLook
 
 _WINDOWS, _DECK = int(Material.WINDOWS), int(Material.DECK)
 _FOLIAGE, _LAMP = int(Material.FOLIAGE), int(Material.LAMP)
@@ -29,7 +29,7 @@ F = np.float32
 
 
 @kernel
-def colour_sky(canvas: Canvas, look: Look, a: int, b: int, drop: float) -> None:
+def colour_sky(canvas: Canvas, look: WeatherLook, a: int, b: int, drop: float) -> None:
     """Colours the pixels [a, b) of a row of sky, whose rays rise by `drop`, 1 ahead."""
     up = max(0.0, drop) / math.sqrt(1.0 + drop * drop)
     k = 1.4 * up / (0.4 + up)

@@ -25,7 +25,7 @@ from di_envs.sensors.camera.raster_spans import (
 )
 from di_envs.sensors.camera.spans import Axis, fill, light_ground, shade_span
 from di_envs.sensors.scene.raster import LEVELS, TEXEL_M, Raster
-from di_envs.sensors.weather import Look
+from di_envs.sensors.weather import WeatherLook
 
 _TAPS = 3  # samples along the road for a row that is far longer than wide
 F = np.float32
@@ -211,7 +211,9 @@ def _within_strips(
 
 
 @kernel
-def _light_plane(canvas: Canvas, look: Look, a: int, b: int, far: float, drop: float) -> None:
+def _light_plane(
+    canvas: Canvas, look: WeatherLook, a: int, b: int, far: float, drop: float
+) -> None:
     """Lights a span of ground, wets it, and hides it in haze; arguments of `colour_ground`."""
     k = look.haze * far
     clear = 1.0 / (1.0 + k + 0.5 * k * k)

@@ -15,7 +15,7 @@ from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.scene.boxes import Boxes, Material
 from di_envs.sensors.scene.scene import ROOM
-from di_envs.sensors.weather import Look
+from di_envs.sensors.weather import WeatherLook
 from di_envs.world.state import State
 
 NEAR = 0.1  # m; nothing nearer is seen
@@ -93,7 +93,7 @@ def place_camera(state: State, ego: int, cam: Camera) -> None:
 
 @kernel
 def project_boxes(
-    cam: Camera, boxes: Boxes, look: Look, width: int, height: int, out: Projected
+    cam: Camera, boxes: Boxes, look: WeatherLook, width: int, height: int, out: Projected
 ) -> None:
     """Finds the boxes that a camera sees and prepares their rays and colours.
 
@@ -234,7 +234,9 @@ def _rays(rel: Float64, axes: Float64, cam: Camera, rays: Float32) -> None:
 
 
 @kernel
-def _light(boxes: Boxes, b: int, axes: Float64, look: Look, eye: Float32, faces: Float32) -> None:
+def _light(
+    boxes: Boxes, b: int, axes: Float64, look: WeatherLook, eye: Float32, faces: Float32
+) -> None:
     """Writes the colours of a box's faces that the camera may see: +x, -x, +y, -y, +z, -z.
 
     Args:

@@ -14,13 +14,15 @@ from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.camera.projection import NEAR, Camera, Projected
 from di_envs.sensors.scene.boxes import Boxes
-from di_envs.sensors.weather import Look
+from di_envs.sensors.weather import WeatherLook
 
 SHADOW_RANGE_M = 90.0
 
 
 @kernel
-def project_shadows(cam: Camera, boxes: Boxes, look: Look, base_z: float, out: Projected) -> None:
+def project_shadows(
+    cam: Camera, boxes: Boxes, look: WeatherLook, base_z: float, out: Projected
+) -> None:
     """Prepares the shadows that boxes cast on the plane at height `base_z` [m]."""
     out.count[1] = 0
     sun_x, sun_y, sun_z = np.float64(look.sun[0]), np.float64(look.sun[1]), np.float64(look.sun[2])

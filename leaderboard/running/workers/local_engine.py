@@ -13,7 +13,7 @@ from multiprocessing.connection import wait
 from typing import Protocol
 
 from leaderboard.running.jobs import Job, RunSpec
-from leaderboard.running.messages import Compiling, Driven, EngineEvent, Scene, WorkerMessage
+from leaderboard.running.messages import Compiling, Driven, EngineEvent, RunFacts, WorkerMessage
 from leaderboard.running.wall_clock import Limits
 from leaderboard.running.workers.scheduler import PAUSE_S, Scheduler
 from leaderboard.running.workers.worker_process import WorkerProcess
@@ -66,9 +66,9 @@ class _Processes:
         self._spec, self._limits = spec, limits
         self._compiled = False
         self._begun: set[WorkerProcess] = set()
-        self._waiting: dict[WorkerProcess, Scene | None] = {}
+        self._waiting: dict[WorkerProcess, RunFacts | None] = {}
 
-    def hire(self, scene: Scene | None) -> WorkerProcess:
+    def hire(self, scene: RunFacts | None) -> WorkerProcess:
         """Starts a process."""
         worker = WorkerProcess(self._spec, self._limits)
         self._waiting[worker] = scene
@@ -96,7 +96,7 @@ class _Processes:
         self._let_begin()
         return told
 
-    def check(self, first: Scene, other: Scene) -> None:
+    def check(self, first: RunFacts, other: RunFacts) -> None:
         """One machine gives the same bits."""
 
     def dismiss(self, worker: WorkerProcess) -> None:

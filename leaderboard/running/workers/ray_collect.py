@@ -82,7 +82,7 @@ class RayPending:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class DrivenBefore:
     """A drive whose file is here already."""
 
     outcome: Outcome
@@ -105,7 +105,7 @@ class RayPool:
     def submit(self, work: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending[Outcome]:
         """Has a job driven, unless its file is here."""
         if job.done:
-            return Found(outcome=work(job))
+            return DrivenBefore(outcome=work(job))
         elsewhere = self.ray.remote(num_cpus=1)(drive_elsewhere)
         return RayPending(ray=self.ray, reference=elsewhere.remote(work, job))
 

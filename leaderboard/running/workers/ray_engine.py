@@ -29,7 +29,7 @@ from leaderboard.running.messages import (
     EngineEvent,
     Ready,
     Refused,
-    Scene,
+    RunFacts,
     Warned,
     WorkerMessage,
 )
@@ -103,7 +103,7 @@ class _Actors:
         self._ray, self._spec, self._limits = ray, spec, limits
         self._actor_class = ray.remote(num_cpus=1, max_restarts=0)(RayWorker)
 
-    def hire(self, scene: Scene | None) -> _Held:
+    def hire(self, scene: RunFacts | None) -> _Held:
         """Starts an actor, wherever there is room."""
         requires = scene.requires if scene else None
         actor = self._actor_class.remote(self._spec, self._limits, requires)
@@ -132,7 +132,7 @@ class _Actors:
             return [Died(status=WORKER_DIED, reason=f"the Ray worker is gone: {_brief(error)}")]
         return told
 
-    def check(self, first: Scene, other: Scene) -> None:
+    def check(self, first: RunFacts, other: RunFacts) -> None:
         """Machines of a cluster may be unlike."""
         check_footing(first, other)
 
@@ -141,7 +141,7 @@ class _Actors:
         self._ray.kill(worker.actor)
 
 
-def check_footing(first: Scene, other: Scene) -> None:
+def check_footing(first: RunFacts, other: RunFacts) -> None:
     """Refuses a machine that would give other bits.
 
     Raises:

@@ -20,7 +20,7 @@ from leaderboard.running.messages import (
     Pause,
     Ready,
     Refused,
-    Scene,
+    RunFacts,
     Started,
     WorkerMessage,
 )
@@ -34,7 +34,7 @@ W = TypeVar("W")
 class Crew(Protocol[W]):
     """Workers of one kind, each a process that sets the run up and then drives one job a time."""
 
-    def hire(self, scene: Scene | None) -> W:
+    def hire(self, scene: RunFacts | None) -> W:
         """Starts a worker; with no scene it is the one that finds out what there is to drive."""
         ...
 
@@ -46,7 +46,7 @@ class Crew(Protocol[W]):
         """What workers told, waiting `PAUSE_S` at most; `Died` is the last that one tells."""
         ...
 
-    def check(self, first: Scene, other: Scene) -> None:
+    def check(self, first: RunFacts, other: RunFacts) -> None:
         """Refuses a worker that would give other bits than the first one.
 
         Raises:
@@ -81,7 +81,7 @@ class Scheduler(Generic[W]):
         """
         self._crew, self._most, self._jobs = crew, workers, jobs
         self._hired: list[_Hired[W]] = []
-        self._scene: Scene | None = None
+        self._scene: RunFacts | None = None
         self._never_ready = 0
 
     def run(self) -> Generator[EngineEvent]:

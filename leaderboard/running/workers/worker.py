@@ -52,7 +52,7 @@ def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:
 
     from leaderboard.running.compiling import compile_events
     from leaderboard.running.messages import Compiling, Driven, Ready, Refused, Warned
-    from leaderboard.running.setting_up import scene_of, set_up
+    from leaderboard.running.setting_up import run_facts, set_up
 
     def compiling(event: Compiling) -> None:
         watch.lap()  # each kernel has the whole time
@@ -71,7 +71,7 @@ def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:
         except SetupError as error:
             tell(Refused(reason=str(error)))
             return
-        tell(Ready(scene=scene_of(driver)))
+        tell(Ready(scene=run_facts(driver)))
         with driver:
             while True:
                 watch.mark(Doing.WAITING)

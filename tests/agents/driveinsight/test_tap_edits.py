@@ -10,7 +10,7 @@ from agents.driveinsight.agent import DriveInsightAgent
 from agents.driveinsight.config import config_named
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Policy
-from agents.driveinsight.tap_edits import Moment, TapEdit, tap_edits
+from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
 from agents.driveinsight.taps import editing, watching
 from agents.driveinsight.weights import save_pretrained
 from di_envs.edits.text import EditError, read_edits
@@ -20,7 +20,7 @@ from tests.agents.driveinsight.random_inputs import random_inputs
 from wrappers.interventions import ObservationEditing
 from wrappers.interventions.context import EditContext
 
-NOW = Moment(seed=3, decision=60, time_s=6.0)
+NOW = DecisionMoment(seed=3, decision=60, time_s=6.0)
 
 
 def made(name: str) -> Policy:
@@ -112,7 +112,7 @@ def test_draws_are_keyed_by_the_seed_and_the_decision(seeing):
     inputs = random_inputs(seeing.config)
 
     def noisy(seed, decision):
-        moment = Moment(seed=seed, decision=decision, time_s=1.0)
+        moment = DecisionMoment(seed=seed, decision=decision, time_s=1.0)
         return planned(seeing, inputs, "noise:waypoints,sigma=1", moment)[0]
 
     assert torch.equal(noisy(3, 60), noisy(3, 60))

@@ -22,7 +22,7 @@ from leaderboard.replaying.replay import replay, replay_env
 from leaderboard.replaying.verify import verify_run
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.runner import new_run
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.tables.branch_text import branch_tables
 
@@ -59,7 +59,7 @@ def driven(agent: str) -> RunRecord:
     spec = RunSpec(agent=agent, options={"suite": SUITE, "route_ids": (ROUTE,)})
     job = Job(index=0, route_id=ROUTE, seed=0)
     with set_up(spec, Stopwatch()) as driver:
-        scene = scene_of(driver)
+        scene = run_facts(driver)
         record = driver.drive(job)
     run = new_run(spec, [job], load_suite(SUITE), scene)
     return dataclasses.replace(run, routes=(record,))

@@ -26,7 +26,7 @@ from leaderboard.running.driver import Driver
 from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.runner import new_run
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.studies.comparing import compare_runs
 from wrappers.interventions.losing import Delay
@@ -50,7 +50,7 @@ def driven(edits="", **options):
     job = Job(index=0, route_id=ROUTE, seed=0)
     with Driver(spec(edits, **options)) as driver:
         record = driver.drive(job)
-        run = new_run(driver.spec, [job], load_suite("town05_tiny"), scene_of(driver))
+        run = new_run(driver.spec, [job], load_suite("town05_tiny"), run_facts(driver))
     return dataclasses.replace(run, routes=(record,))
 
 

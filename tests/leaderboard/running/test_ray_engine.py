@@ -20,9 +20,9 @@ from leaderboard.commands.ending import EXIT_USAGE
 from leaderboard.records.record import RunRecord
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import RunSpec, SetupError, plan_jobs
-from leaderboard.running.messages import Scene
+from leaderboard.running.messages import RunFacts
 from leaderboard.running.runner import evaluate
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.running.workers.ray_engine import RayEngine, check_footing
 from leaderboard.studies.study_file import read_study
@@ -111,9 +111,9 @@ def test_a_study_starts_one_cluster_for_all_its_rows(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def scene() -> RunFacts:
     with set_up(RunSpec(agent="constant", options=OPTIONS), Stopwatch()) as driver:
-        return scene_of(driver)
+        return run_facts(driver)
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,21 @@ import pytest
 
 from agents.base import Requirements
 from leaderboard.records.record import WORKER_DIED
+from leaderboard.running.finished_route import lost_record
 from leaderboard.running.jobs import Job, SetupError, plan_jobs
-from leaderboard.running.log import lost_record
-from leaderboard.running.messages import Died, Driven, Lost, Pause, Ready, Refused, Scene, Started
+from leaderboard.running.messages import (
+    Died,
+    Driven,
+    Lost,
+    Pause,
+    Ready,
+    Refused,
+    RunFacts,
+    Started,
+)
 from leaderboard.running.workers.scheduler import Scheduler
 
-SCENE = Scene(
+SCENE = RunFacts(
     requires=Requirements(),
     agent_version="ab",
     town="toy",

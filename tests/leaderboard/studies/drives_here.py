@@ -11,7 +11,7 @@ from pathlib import Path
 
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.messages import Driven, EngineEvent, Ready, Started
-from leaderboard.running.setting_up import scene_of, set_up
+from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.studies.record import DrivenRow, Study, StudyDrive
 from leaderboard.studies.rows import ABLATION_ROWS, BASELINE_ROW, NULL_ROW
@@ -33,7 +33,7 @@ class HereEngine:
 
     def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
         driver = set_up(spec, Stopwatch())
-        yield Ready(scene=scene_of(driver))
+        yield Ready(scene=run_facts(driver))
         with driver:
             while jobs:
                 job = jobs.popleft()
