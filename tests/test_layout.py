@@ -35,9 +35,7 @@ FLOORS = {
     ),
     "wrappers": ({"interventions"}, {""}),
     "leaderboard": (
-        {"envs", "utils"},
-        {"autoagents"},
-        {"scoring", "statistics"},
+        {"scoring", "statistics", "autoagents", "envs", "utils"},
         {"records"},
         {"running"},
         {"replaying"},
