@@ -216,7 +216,8 @@ def read_dropped(path: Path) -> Mapping[str, Any]:
     """
     try:
         facts = from_json(dict[str, Any], read_json(path), str(path))
-        return {**facts, "why": str(facts["why"])}
+        why = from_json(str, facts["why"], str(path), "why")
+        return {**facts, "why": why}
     except (JsonError, KeyError) as error:
         raise DriveFileError(
             f"{path} does not say why ({error}): delete it and run collect again"

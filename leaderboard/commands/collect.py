@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rich.console import Console
 from rich.table import Table
 
-from di_envs.files.json_values import indented
-from di_envs.files.whole import write_whole
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 
@@ -78,6 +76,8 @@ class Collect:
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.towns import TRAINING_TOWNS
         from di_envs.config import check_name
+        from di_envs.files.json_values import indented
+        from di_envs.files.whole import write_whole
         from leaderboard.running.compiling import compile_progress
         from leaderboard.running.jobs import SetupError
 

@@ -192,8 +192,8 @@ def test_collecting_gives_the_same_files_stopped_or_not_with_one_process_or_two(
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"why": 3}', "[" * 100_000], ids=len)
 def test_a_garbled_reason_for_a_dropped_drive_says_what_to_do(tmp_path, text):
     path = tmp_path / "a.dropped.json"
-    write_dropped(path, "red light")
-    assert read_dropped(path) == "red light"
+    write_dropped(path, "red light", {"driver": "expert"})
+    assert read_dropped(path) == {"why": "red light", "driver": "expert"}
     path.write_text(text)
     with pytest.raises(DriveFileError, match=r"a\.dropped\.json does not say why .*run collect"):
         read_dropped(path)

@@ -81,7 +81,9 @@ def test_other_weights_are_noticed_at_the_first_other_decision_and_named(run, we
     with pytest.raises(RetraceError, match=r"at 0(\.1)? s the agent acts otherwise.*the weights"):
         list(retrace(other, run.routes[0]))
     gone = dataclasses.replace(run, agent=f"driveinsight:{tmp_path / 'gone'}")
-    with pytest.raises(RetraceError, match=r"is not to be had here: .*config\.json cannot be read"):
+    with pytest.raises(
+        RetraceError, match=r"is not to be had here: .*config\.json: cannot be read"
+    ):
         list(retrace(gone, run.routes[0]))
 
 
