@@ -103,6 +103,7 @@ def dotted(node):
     return ".".join([node.id, *reversed(parts)]) if isinstance(node, ast.Name) else ""
 
 
+@cache
 def floor_of(module):
     """On which floor of its package a module stands."""
     package, _, rest = module.partition(".")
