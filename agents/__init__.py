@@ -23,51 +23,69 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AgentEntry:
-    """A line of the table of agents."""
+    """A line of the table of agents.
+
+    Its `version` is raised by any change after which the agent acts otherwise in the same world;
+    `tests/golden` says when that is due. Weights are told by a hash, not by it.
+    """
 
     entry_point: str  # module:Class
     summary: str
+    version: int
     options: Mapping[str, Any] = field(default_factory=dict)  # keyword arguments of the class
     argument: str = "path"  # of the class, for what follows a scheme's colon
     data: str = ""  # folder beside this file that the agent reads, such as weights
+    data_files: tuple[str, ...] = ()  # those of a folder that decide what it does; () for all
+    packages: tuple[str, ...] = ()  # whose version can change what it does
 
 
 AGENTS: dict[str, AgentEntry] = {
     "expert": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="rules over the true state: follows, predicts, yields, obeys lights and signs",
+        version=1,
     ),
     "expert-blind": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores all other actors (a control for traffic's politeness)",
+        version=1,
         options={"ignore_actors": True},
     ),
     "expert-redrunner": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores traffic lights (a control for the red-light rule)",
+        version=1,
         options={"ignore_lights": True},
     ),
     "expert-signrunner": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores stop signs (a control for the stop-sign rule)",
+        version=1,
         options={"ignore_signs": True},
     ),
     "highway": AgentEntry(
         entry_point="agents.highway:HighwayAgent",
         summary="highway-env's own IDM, MOBIL and steering controllers; knows no lights or signs",
+        version=1,
+        packages=("highway-env",),
     ),
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="the paper's policy: cameras, LiDAR and prompt to waypoints",
+        version=1,
         data="driveinsight/weights",
+        data_files=("config.json", "weights.safetensors"),
+        packages=("torch",),
     ),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",
+        version=1,
     ),
     "random": AgentEntry(
         entry_point="agents.random:RandomAgent",
         summary="keyed uniform controls, each held for a second",
+        version=1,
     ),
 }
 
@@ -77,15 +95,22 @@ SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
         entry_point="agents.carla.agent:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
+        version=1,
+        packages=("highway-env", "stable-baselines3", "torch"),
     ),
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="driveinsight:FOLDER: a policy that `driveinsight train` wrote",
+        version=1,
         argument="weights",
+        data_files=("config.json", "weights.safetensors"),
+        packages=("torch",),
     ),
     "sb3": AgentEntry(
         entry_point="agents.sb3.agent:Sb3Agent",
         summary="sb3:FILE.zip[?control_dt_s=0.2]: a model that Stable-Baselines3 saved",
+        version=1,
+        packages=("stable-baselines3", "torch"),
     ),
 }
 
@@ -113,7 +138,7 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     scheme, _, place = spec.partition(":")
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
-        path, said = _place_and_options(spec, place)
+        path, said = place_and_options(spec, place)
         given = {entry.argument: path, **said, **options}
         return _make(spec, entry.entry_point, {**entry.options, **given})
     if ":" not in spec:
@@ -121,8 +146,16 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     return _make(spec, spec, options)
 
 
-def _place_and_options(spec: str, place: str) -> tuple[str, dict[str, str]]:
-    """A file and what is said of it: `weights.zip?device=cpu` is `weights.zip`, device: cpu."""
+def place_and_options(spec: str, place: str) -> tuple[str, dict[str, str]]:
+    """A file and what is said of it: `weights.zip?device=cpu` is `weights.zip`, device: cpu.
+
+    Args:
+        spec: The whole specification, for the error.
+        place: What follows the scheme's colon.
+
+    Raises:
+        AgentSpecError: If what is said is not option=value.
+    """
     path, _, query = place.partition("?")
     options = dict(part.partition("=")[::2] for part in query.split("&") if part)
     for name, value in options.items():

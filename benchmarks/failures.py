@@ -17,10 +17,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from di_envs.course import load_course
 from di_envs.drawing.view import MAP_PX, Renderer
+from di_envs.rules import rules_named
+from di_envs.world.event_names import EVENT_NAMES
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import read_run
 from leaderboard.replaying.replay import replay, replay_env
-from leaderboard.scoring.rules import rules_named
 
 BEFORE_S = (3.0, 1.5, 0.0)  # moments before an infraction that are shown
 PANEL_PX, TITLE_PX, GAP_PX = 300, 26, 6
@@ -53,7 +54,7 @@ def failures_of(run: RunRecord) -> Mapping[str, Sequence[Failure]]:
     for record in run.routes:
         for event in record.events:
             if event.kind in scored:
-                kind = event.kind.name.lower().replace("_", " ")
+                kind = EVENT_NAMES[event.kind]
                 words = f"{kind} {event.other_type}".rstrip()
                 found[kind].append(Failure(record=record, time_s=event.time_s, words=words))
     return dict(sorted(found.items(), key=lambda item: -len(item[1])))

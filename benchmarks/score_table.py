@@ -10,9 +10,9 @@ import argparse
 import math
 from pathlib import Path
 
+from di_envs.rules import rules_named
 from leaderboard.records.record import RunRecord
 from leaderboard.records.results import ResultsError, read_run
-from leaderboard.scoring.rules import rules_named
 from leaderboard.statistics.confidence import mean_interval
 from leaderboard.tables.run_tables import driving_interval, mean_bound, seed_means
 

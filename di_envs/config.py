@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from di_envs.files.names import check_name as check_name  # from here, too
+from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
-from di_envs.world.kinds import TICK_S, EventKind
+from di_envs.world.event_names import EVENT_KEYS
+from di_envs.world.kinds import TICK_S
 
 OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar", "odometry")
 # In place of a tuple of groups: the name of a preset, which chooses groups and the rig.
 OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
     "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}
 }
-EVENT_NAMES = tuple(kind.name.lower() for kind in EventKind)
-RULES = ("carla-1.0", "carla-2.0", "carla-2.1")
 
 # Names of CARLA's presets (carla.WeatherParameters), the fourteen of the Leaderboard first.
 WEATHERS = (
@@ -46,19 +46,6 @@ WEATHERS = (
     "DustStorm",
     "Default",
 )
-
-
-def check_name(name: str, known: Iterable[str], what: str) -> None:
-    """Refuses a name that is not known.
-
-    Raises:
-        ValueError: If it is not among `known`; suggests the nearest, and lists all.
-    """
-    names = list(known)
-    if name not in names:
-        near = difflib.get_close_matches(str(name), names, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"Unknown {what} {name!r}; {hint}known: {', '.join(names)}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +147,7 @@ class RouteEnvConfig:
         for group in self.observations:
             check_name(group, OBSERVATION_GROUPS, "observation group")
         for event in self.terminate_on:
-            check_name(event, EVENT_NAMES, "event in terminate_on")
+            check_name(event, EVENT_KEYS.values(), "event in terminate_on")
         if self.weather is not None:
             check_name(self.weather, WEATHERS, "weather")
         check_name(self.rules, RULES, "rules")

@@ -15,18 +15,21 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from di_envs.config import RouteEnvConfig, check_name
-from di_envs.observation import Observer, observation_space
-from di_envs.penalties import PENALTIES, Penalties
+from di_envs.observation import observation_space
+from di_envs.observer import Observer
 from di_envs.reward import (
     Standing,
     infraction_penalty,
     reward_terms,
     score_metres,
 )
+from di_envs.rules import rules_named
+from di_envs.rules.penalties import Penalties
 from di_envs.suites import choose_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.event_names import EVENT_KEYS, event_of_key
 from di_envs.world.state import TICK_S, EventKind
 from di_envs.world.world import Event, WorldConfig, WorldView
 
@@ -132,7 +135,7 @@ class Course:
             "junction_m": float(self.junction_m[plan.route_id][state.route_index[ego]]),
             "reward_terms": reward_terms(before, after, self.penalties),
             "events": events,
-            "finished": EventKind(finished).name.lower() if finished else "",
+            "finished": EVENT_KEYS[EventKind(finished)] if finished else "",
         }
 
 
@@ -164,8 +167,8 @@ def load_course(options: Mapping[str, Any]) -> Course:
         town=town,
         plans=plans,
         world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
-        penalties=PENALTIES[config.rules],
-        stops=tuple(EventKind[name.upper()] for name in config.terminate_on),
+        penalties=rules_named(config.rules).penalties,
+        stops=tuple(event_of_key(name) for name in config.terminate_on),
         junction_m={plan.route_id: junction_distances(town, plan) for plan in plans},
     )
 

@@ -1,4 +1,4 @@
-"""What a driver sees: the observation space by groups, and the observer that fills it.
+"""What a driver sees: the observation space by groups; `observer.py` fills it.
 
 The space is one flat Dict of fixed shapes, padded with a validity column. Ego frame: metres, x
 ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to ±100 m.
@@ -6,16 +6,11 @@ ahead, y right, yaw clockwise relative to the ego's; coordinates are clipped to 
 
 from __future__ import annotations
 
-import copy
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
-from di_envs.numerics.bundles import by_reference
-from di_envs.numerics.kernels import bind, kernel
 from di_envs.prompt import (
     COMPONENTS,
     LIGHTS,
@@ -25,33 +20,22 @@ from di_envs.prompt import (
     ROUTING_POINTS,
     SPEED_LIMIT_MPS,
     STOP_SIGNS,
-    Prompt,
-    PromptRoute,
-    StopLines,
-    empty_prompt,
-    fill_prompt,
-    prompt_route_of,
-    stop_lines_of,
 )
-from di_envs.sensors.camera.cameras import FAR_M, CameraRig
+from di_envs.sensors.camera.cameras import FAR_M
 from di_envs.sensors.camera.config import Rig, rig_of
-from di_envs.sensors.inertial import IMU_LIMIT, fill_gnss, fill_imu
+from di_envs.sensors.inertial import IMU_LIMIT
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
-from di_envs.sensors.lidar.sweep import Lidar
 from di_envs.sensors.scene.tags import Tag
-from di_envs.sensors.weather import weather_of
-from di_envs.town.lanes import Lanes, LightState
-from di_envs.town.map_chunks import POINTS, MapChunks, MapKind, build_map_chunks
+from di_envs.town.lanes import LightState
+from di_envs.town.map_chunks import POINTS, MapKind
 from di_envs.town.plan import RoadOption
-from di_envs.town.town import Town
-from di_envs.world.state import SPEED_HISTORY, ActorKind, State
-from di_envs.world.world import WorldView
+from di_envs.world.state import SPEED_HISTORY, ActorKind
 
 ODOMETRY_LIMIT_M = 1e5  # distances from the route's start are clipped to this
 
-_PI = float(np.float32(np.pi))
+PI = float(np.float32(np.pi))  # as far as a yaw in single precision goes
 _XY = (-POSITION_LIMIT_M, POSITION_LIMIT_M)
-_YAW = (-_PI, _PI)
+_YAW = (-PI, PI)
 _SIZE = (0.0, 100.0)
 _SPEED = (-SPEED_LIMIT_MPS, SPEED_LIMIT_MPS)
 _VALID = (0.0, 1.0)
@@ -69,7 +53,7 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
     "stop_signs": ((STOP_SIGNS,), [_XY, _XY, _YAW, _VALID]),
     "speed": ((), [_SPEED]),
     "speed_history": ((), [_SPEED] * SPEED_HISTORY),
-    "imu": ((), [(-IMU_LIMIT, IMU_LIMIT)] * 6 + [(0.0, 2.0 * _PI)]),
+    "imu": ((), [(-IMU_LIMIT, IMU_LIMIT)] * 6 + [(0.0, 2.0 * PI)]),
     "odometry": ((), [(-ODOMETRY_LIMIT_M, ODOMETRY_LIMIT_M)] * 2 + [_YAW]),
 }
 
@@ -159,172 +143,3 @@ def _table(name: str) -> spaces.Box:
     low, high = np.array(columns, np.float32).T
     shape = (*leading, len(columns))
     return spaces.Box(np.broadcast_to(low, shape), np.broadcast_to(high, shape), dtype=np.float32)
-
-
-@by_reference
-class Sight(NamedTuple):
-    """All that one look at the world reads and writes: one argument, as each costs time."""
-
-    state: State
-    route: PromptRoute
-    stop_lines: StopLines
-    lanes: Lanes
-    chunks: MapChunks
-    geo_origin: NDArray[np.float64]  # (2,) latitude, longitude [deg]
-    prompt: Prompt  # written, as are the rest
-    imu: NDArray[np.float32]  # (7,)
-    gnss: NDArray[np.float64]  # (3,)
-
-
-@kernel
-def fill_observation(sight, ego, with_prompt, with_inertial):  # type: ignore[no-untyped-def]
-    """Writes the groups that are asked for, for one ego."""
-    if with_prompt:
-        fill_prompt(sight.state, sight.route, sight.stop_lines, sight.chunks, ego, sight.prompt)
-    if with_inertial:
-        fill_imu(sight.state, sight.lanes, ego, sight.imu)
-        fill_gnss(sight.state, ego, sight.geo_origin[0], sight.geo_origin[1], sight.gnss)
-
-
-def prompt_observation(prompt: Prompt) -> dict[str, NDArray[Any]]:
-    """Copies of a prompt's arrays by name, or of those of many worlds, with all flags of presence.
-
-    `command` keeps its last axis, of length 1.
-    """
-    found = {name: getattr(prompt, name).copy() for name in COMPONENTS}
-    found["prompt_present"] = np.ones((*prompt.command.shape[:-1], len(COMPONENTS)), np.int8)
-    return found
-
-
-class Observer:
-    """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables.
-
-    Attributes:
-        weather: What cameras see from the next `start` on.
-    """
-
-    def __init__(
-        self,
-        town: Town,
-        groups: tuple[str, ...],
-        ego: int = 0,
-        *,
-        cameras: str | Rig = "small",
-        lidar: str | LidarConfig = "paper",
-        half_sweeps: bool = False,
-        weather: str | None = None,
-    ) -> None:
-        """Prepares to look.
-
-        Args:
-            town: The town.
-            groups: Groups of observations.
-            ego: Index of the ego that looks.
-            cameras: Its rig, or the name of a shipped one; for group `camera`.
-            lidar: Its LiDAR, or the name of a shipped one; for group `lidar`.
-            half_sweeps: It looks at every tick, so it sees half a turn of the LiDAR each time.
-            weather: What cameras see, one of CARLA's presets; None for ClearNoon.
-        """
-        self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
-        self._with_odometry = "odometry" in groups
-        self._rig = rig_of(cameras) if "camera" in groups else None
-        self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
-        self._half_sweeps = half_sweeps
-        self.weather = weather or "ClearNoon"
-        self._ego, self._town = ego, town
-        self._prompt: Prompt | None = None
-        self._stop_lines = stop_lines_of(town.signals)
-        self._chunks = build_map_chunks(town.lanes)
-        self._geo_origin = np.array(town.geo_origin, np.float64)
-
-    def of_ego(self, ego: int) -> Observer:
-        """Another observer, of that ego: it shares the static tables, `start` makes its buffers."""
-        other = copy.copy(self)
-        other._ego = ego
-        other._prompt = None
-        return other
-
-    def write_prompt_to(self, prompt: Prompt) -> None:
-        """Makes `prompt` the buffer, from the next `start` on; a row of many worlds', say."""
-        self._prompt = prompt
-
-    def start(self, view: WorldView) -> None:
-        """Takes up an episode: the view's state arrays and the ego's plan."""
-        self._sight = Sight(
-            state=view.state,
-            route=prompt_route_of(view.plans[self._ego]),
-            stop_lines=self._stop_lines,
-            lanes=self._town.lanes,
-            chunks=self._chunks,
-            geo_origin=self._geo_origin,
-            prompt=empty_prompt() if self._prompt is None else self._prompt,
-            imu=np.zeros(7, np.float32),
-            gnss=np.zeros(3, np.float64),
-        )
-        self._fill = bind(
-            fill_observation, self._sight, self._ego, self._with_prompt, self._with_inertial
-        )
-        self._cameras: CameraRig | None = None
-        if self._rig is not None:
-            weather = weather_of(self.weather)
-            self._cameras = CameraRig(self._town, self._rig, weather, self._ego)
-            self._cameras.start(view)
-        self._lidar: Lidar | None = None
-        if self._lidar_config is not None:
-            self._lidar = Lidar(
-                self._town, self._lidar_config, self._ego, half_sweeps=self._half_sweeps
-            )
-            self._lidar.start(view)
-
-    def change_weather(self, weather: str) -> None:
-        """What cameras see from now on; for much less than another `start`."""
-        self.weather = weather
-        if self._cameras is not None:
-            self._cameras.change_weather(weather_of(weather))
-
-    def front(self) -> dict[str, Any]:
-        """What a view for people shows of the observation: the front camera, if there is one."""
-        return {} if self._cameras is None else self._cameras.observe(only="camera_front")
-
-    def observe(self) -> dict[str, Any]:
-        """The present observation; every array is a fresh one."""
-        observation: dict[str, Any] = {}
-        self.write_tables()
-        if self._with_prompt:
-            observation.update(prompt_observation(self._sight.prompt))
-            observation["command"] = observation["command"][0]
-        observation.update(self.measure())
-        return observation
-
-    def write_tables(self) -> None:
-        """Writes the prompt and the inertial sensors to their buffers: the first part of a look."""
-        self._fill(self._sight, self._ego, self._with_prompt, self._with_inertial)
-
-    def measure(self) -> dict[str, Any]:
-        """What sensors see: the second part of a look, all of it but the prompt."""
-        observation: dict[str, Any] = {}
-        sight = self._sight
-        if self._with_inertial:
-            observation["imu"] = sight.imu.copy()
-            observation["gnss"] = sight.gnss.copy()
-            if not self._with_prompt:
-                speed_mps = float(sight.state.speed[self._ego])
-                speed_mps = min(max(speed_mps, -SPEED_LIMIT_MPS), SPEED_LIMIT_MPS)
-                observation["speed"] = np.array([speed_mps], np.float32)
-        if self._with_odometry:
-            observation["odometry"] = _odometry(sight.state, sight.route, self._ego)
-        if self._cameras is not None:
-            observation.update(self._cameras.observe())
-        if self._lidar is not None:
-            observation.update(self._lidar.observe())
-        return observation
-
-
-def _odometry(state: State, route: PromptRoute, ego: int) -> NDArray[np.float32]:
-    """(3,) x, y [m], yaw [rad] of an ego in the frame of its route's first point."""
-    x, y, _, yaw = route.points[0].tolist()
-    dx, dy = float(state.x[ego]) - x, float(state.y[ego]) - y
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    turn = math.remainder(float(state.yaw[ego]) - yaw, 2.0 * math.pi)
-    place = np.clip([cos * dx + sin * dy, cos * dy - sin * dx], -ODOMETRY_LIMIT_M, ODOMETRY_LIMIT_M)
-    return np.array([*place, min(max(turn, -_PI), _PI)], np.float32)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from di_envs.penalties import Penalties
+from di_envs.rules.penalties import Penalties
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.state import EventKind, State
 
 
@@ -77,7 +78,7 @@ def reward_terms(before: Standing, after: Standing, penalties: Penalties) -> dic
         if after.counts[kind] != before.counts[kind]:
             seen = _with_kind(seen, after, kind)
             left = inside_m * infraction_penalty(seen, penalties)
-            terms[kind.name.lower()] = left - score
+            terms[EVENT_KEYS[kind]] = left - score
             score = left
     return terms
 

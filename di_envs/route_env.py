@@ -15,7 +15,7 @@ from di_envs.config import WEATHERS, check_name
 from di_envs.course import load_course
 from di_envs.drawing.screen import Screen, check_render_mode
 from di_envs.numerics.keyed_random import Stream, keyed_hash
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.reward import Standing, standing_of
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, Snapshot, World, WorldView

@@ -6,13 +6,14 @@ A suite is a JSON file in `town/data/suites`. A change that can move a score nee
 from __future__ import annotations
 
 import dataclasses
-import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn
 
-from di_envs.config import WEATHERS, check_name
+from di_envs.config import WEATHERS
+from di_envs.files.json_values import from_json, read_json
+from di_envs.files.names import check_name
 from di_envs.town.plan import RoutePlan
 from di_envs.town.routing.road_graph import build_road_graph
 from di_envs.town.routing.router import MAX_SNAP_M, plan_route
@@ -73,24 +74,6 @@ class Suite:
     def __post_init__(self) -> None:
         check_name(self.timeout_rule, TIMEOUT_RULES, "timeout rule")
         check_name(self.weather, WEATHERS, "weather")
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """A suite of what its JSON file says.
-
-        Raises:
-            ValueError: If a field is unknown or missing.
-        """
-        fields = dataclasses.fields(cls)
-        for key in values:
-            check_name(key, [field.name for field in fields], "suite field")
-        required = [field.name for field in fields if field.default is dataclasses.MISSING]
-        if missing := [name for name in required if name not in values]:
-            raise ValueError(f"A suite needs {', '.join(required)}; {', '.join(missing)} missing.")
-        given = dict(values)
-        if "traffic" in given:
-            given["traffic"] = TrafficLevel(**given["traffic"])
-        return cls(**given)
 
     @property
     def routes_path(self) -> Path:
@@ -183,8 +166,16 @@ def load_suite(name: str) -> Suite:
         ValueError: If there is none of this name; suggests the nearest.
     """
     check_name(name, suite_names(), "suite")
-    text = (DATA / "suites" / f"{name}.json").read_text(encoding="utf-8")
-    return Suite.from_mapping(json.loads(text))
+    return read_suite(DATA / "suites" / f"{name}.json")
+
+
+def read_suite(path: Path) -> Suite:
+    """Reads a suite's file.
+
+    Raises:
+        JsonError: If a field is unknown, missing or of another type, or a value is refused.
+    """
+    return from_json(Suite, read_json(path), str(path))
 
 
 def choose_suite(
@@ -216,33 +207,49 @@ def choose_suite(
             f"suite={suite!r}, town={town!r}, routes={routes!r}; "
             f"shipped suites: {', '.join(suite_names())}."
         )
-    chosen = load_suite(suite) if suite is not None else _own_files()
-    changes: dict[str, Any] = {}
+    chosen = _OWN_FILES if suite is None else load_suite(suite)
     if town is not None:
-        changes |= {"town": str(town), "signals": None, "scenarios": None}
+        chosen = _in_town(chosen, str(town))
     if routes is not None:
-        changes |= {"routes": str(routes), "name": Path(routes).stem}
-    if changes:
-        changes |= {"version": 0, "max_snap_m": MAX_SNAP_M}
+        chosen = _over_routes(chosen, str(routes))
     if signals is not None:
-        changes["signals"] = signals
+        chosen = dataclasses.replace(chosen, signals=signals)
     if scenarios is not None:
-        changes["scenarios"] = None if scenarios == NO_SCENARIOS else str(scenarios)
-    chosen = dataclasses.replace(chosen, **changes)
-    for path in (chosen.town_path, chosen.routes_path):
-        if not path.is_file():
-            raise ValueError(f"There is no file '{path}'; check the path.")
-    for path in chosen.scenario_paths:
-        if not path.exists():
-            shipped = sorted(path.stem for path in (DATA / "scenarios").glob("*.json"))
-            if path.parent == Path() and not path.suffix:
-                check_name(path.name, [*shipped, NO_SCENARIOS], "trigger file")
-            raise ValueError(f"There is no trigger file or folder '{path}'; check the path.")
+        placed = None if scenarios == NO_SCENARIOS else str(scenarios)
+        chosen = dataclasses.replace(chosen, scenarios=placed)
+    _check_files(chosen)
     return chosen
 
 
-def _own_files() -> Suite:
-    return Suite(name="", version=0, description="Routes of your own.", town="", routes="")
+_OWN_FILES = Suite(name="", version=0, description="Routes of your own.", town="", routes="")
+_CHANGED: dict[str, Any] = {"version": 0, "max_snap_m": MAX_SNAP_M}  # no longer the shipped one
+
+
+def _in_town(suite: Suite, town: str) -> Suite:
+    """The suite in another town, whose signals and scenarios are its own."""
+    return dataclasses.replace(suite, town=town, signals=None, scenarios=None, **_CHANGED)
+
+
+def _over_routes(suite: Suite, routes: str) -> Suite:
+    """The suite over other routes, which it is named after."""
+    return dataclasses.replace(suite, routes=routes, name=Path(routes).stem, **_CHANGED)
+
+
+def _check_files(suite: Suite) -> None:
+    for path in (suite.town_path, suite.routes_path):
+        if not path.is_file():
+            raise ValueError(f"There is no file '{path}'; check the path.")
+    for path in suite.scenario_paths:
+        if not path.exists():
+            _refuse_scenarios(path)
+
+
+def _refuse_scenarios(path: Path) -> NoReturn:
+    """Says that there is no such file; of a bare name, which names there are."""
+    if path.parent == Path() and not path.suffix:
+        shipped = sorted(path.stem for path in (DATA / "scenarios").glob("*.json"))
+        check_name(path.name, [*shipped, NO_SCENARIOS], "trigger file")
+    raise ValueError(f"There is no trigger file or folder '{path}'; check the path.")
 
 
 def _of_town(specs: list[RouteSpec], town: str | None, path: Path) -> list[RouteSpec]:

@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
-from di_envs.observation import Observer, prompt_observation
+from di_envs.observer import Observer, prompt_observation
 from di_envs.prompt import COMPONENTS, Prompt, empty_prompt
 
 Rows = dict[str, Any]

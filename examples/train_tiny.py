@@ -21,10 +21,10 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from di_envs.rules import rules_named
 from leaderboard.commands.cli import main as driveinsight
 from leaderboard.records.record import RunRecord
 from leaderboard.records.results import read_run
-from leaderboard.scoring.rules import rules_named
 from leaderboard.scoring.score import mean_score
 from leaderboard.tables.run_tables import summary
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.world.state import ActorKind, Capacity, state_dtype, views_of

@@ -21,8 +21,8 @@ from di_envs.edits.conditions import Condition
 from di_envs.edits.text import read_edits
 from di_envs.edits.world import WORLD_EDITS, read_world_edits
 from di_envs.observation import observation_space
-from di_envs.penalties import PENALTIES
 from di_envs.reward import Standing, reward_terms
+from di_envs.rules import CARLA_1_0
 from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
 from leaderboard.commands.cli import Command, Evaluate
@@ -30,7 +30,9 @@ from leaderboard.commands.train import Train
 from wrappers.interventions import EDITS, ObservationEditing
 
 TOP = Path(__file__).resolve().parent.parent
-PAGES = sorted([TOP / "README.md", *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
+PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
+PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard")
+FOLDERS = (*PACKAGES, "tests", "docs", "examples", "benchmarks")
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
@@ -180,13 +182,81 @@ def test_the_readme_names_every_environment_and_no_other():
     assert set(re.findall(r"DriveInsight-\w+-v\d+", README)) == set(di_envs.ENVIRONMENTS)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(TOP)) for page in PAGES])
-def test_links_and_modules_that_a_page_names_are_there(page):
+def told_now(page):
+    """A page's text; of the changes, without the column that says what was before."""
     text = page.read_text(encoding="utf-8")
+    return re.sub(r"^\| `[^|]*", "", text, flags=re.MULTILINE) if page.stem == "CHANGELOG" else text
+
+
+def lost_paths(text):
+    """Paths that a text names and that are not there; in backticks their end is enough."""
+    whole = set(re.findall(rf"(?<![\w/.])(?:{'|'.join(FOLDERS)})/[\w/.-]*\w", text))
+    ends = set(re.findall(r"`([\w/]+\.py)`", text)) - whole
+    files = [f"/{path.relative_to(TOP).as_posix()}" for path in TOP.rglob("*.py")]
+    lost = {name for name in whole if not (TOP / name).exists()}
+    return sorted(lost | {end for end in ends if not any(f.endswith(f"/{end}") for f in files)})
+
+
+def lost_modules(text):
+    """Dotted names of ours that a text says and that lead to no module, or to nothing in it."""
+    said = re.findall(rf"(?<![\w/.-])(?:{'|'.join(PACKAGES)})(?:\.\w+)+\b(?!\()", text)
+    return sorted({name for name in said if not name.endswith((".md", ".py")) and is_lost(name)})
+
+
+def is_lost(name):
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        place = TOP.joinpath(*parts[:count])
+        for file in (place.with_suffix(".py"), place / "__init__.py"):
+            if file.is_file():
+                rest = parts[count:]
+                return bool(rest) and not re.search(rf"\b{rest[0]}\b", file.read_text("utf-8"))
+    return True
+
+
+def misplaced(text):
+    """What is said to stand in a file, "`name` in `folder/file.py`", and does not."""
+    said = re.findall(r"`(\w+)`\s+in\s+`([\w/]+\.py)`", text)
+    return sorted(
+        f"{name} in {file}"
+        for name, file in said
+        if not re.search(
+            rf"^(class |def |    def )?{name}\b", (TOP / file).read_text("utf-8"), re.M
+        )
+    )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(TOP)) for page in PAGES])
+def test_links_files_and_modules_that_a_page_names_are_there(page):
+    text = told_now(page)
     for target in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (page.parent / target).exists(), target
-    for name in re.findall(r"`((?:di_envs|agents|leaderboard|tests|examples|docs)/[\w/.]+)`", text):
-        assert (TOP / name).exists(), name
+    assert lost_paths(text) == []
+    assert lost_modules(text) == []
+    assert misplaced(text) == []
+
+
+def test_what_a_page_names_wrongly_is_found():
+    assert lost_paths("see `di_envs/route_env.py`, `traffic/motion.py`, `motion.py`") == []
+    assert lost_paths("see di_envs/rout_env.py and `traffic/otion.py`") == [
+        "di_envs/rout_env.py",
+        "traffic/otion.py",
+    ]
+    assert lost_modules("`di_envs.route_env.RouteEnv`, di_envs.save(env), agents.md") == []
+    assert lost_modules("`di_envs.routes`, `agents.base.Agnt`") == [
+        "agents.base.Agnt",
+        "di_envs.routes",
+    ]
+    assert misplaced("`load_agent` in `agents/__init__.py`, `EDITS` in\n`agents/base.py`") == [
+        "EDITS in agents/base.py"
+    ]
+
+
+def test_the_page_on_architecture_names_every_folder_of_code():
+    text = (TOP / "docs" / "architecture.md").read_text(encoding="utf-8")
+    for file in [file for name in PACKAGES for file in (TOP / name).rglob("*/__init__.py")]:
+        folder = file.parent.relative_to(TOP)
+        assert re.search(rf"`(\w+/)*{folder.name}/", text), f"nothing is said of {folder}"
 
 
 def test_the_table_of_observations_is_the_space():
@@ -204,7 +274,7 @@ def test_the_table_of_observations_is_the_space():
 def test_the_tables_of_events_and_rewards_are_the_rules():
     told = rows(CONVENTIONS, 3)
     assert {kind.name.lower() for kind in EventKind} <= told.keys()
-    for kind, factor in PENALTIES["carla-1.0"].costs.items():
+    for kind, factor in CARLA_1_0.penalties.costs.items():
         assert told[kind.name.lower()][-1] == f"score x {factor:.2f}"
     still = Standing(0.0, 0.0, (0,) * EVENT_KINDS)
-    assert reward_terms(still, still, PENALTIES["carla-1.0"]).keys() <= rows(CONVENTIONS, 2).keys()
+    assert reward_terms(still, still, CARLA_1_0.penalties).keys() <= rows(CONVENTIONS, 2).keys()

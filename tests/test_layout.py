@@ -21,10 +21,10 @@ ALLOWED = {
 # "" stands for the modules right in the package.
 FLOORS = {
     "di_envs": (
-        {"numerics"},
+        {"numerics", "files"},
         {"town"},
         {"world"},
-        {"sensors", "actions", "highway"},
+        {"rules", "sensors", "actions", "highway"},
         {"", "drawing", "edits"},
     ),
     "agents": (

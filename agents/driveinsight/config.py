@@ -5,17 +5,15 @@ A configuration is saved beside the weights, and weights are loaded into no othe
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from di_envs.config import check_name
+from di_envs.files.json_values import from_json, to_json
 from di_envs.prompt import COMPONENTS
 from di_envs.sensors.camera.config import rig_of
-
-T = TypeVar("T")
 
 FORMAT_VERSION = 1  # of configurations and weights; a change of the network raises it
 
@@ -214,41 +212,21 @@ class PolicyConfig:
 
     def to_mapping(self) -> dict[str, Any]:
         """As values that JSON has."""
-        return _plain(self)
+        values: dict[str, Any] = to_json(self)
+        return values
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+    def from_mapping(cls, values: Any, source: str = "policy configuration") -> Self:
         """The inverse of `to_mapping`.
 
+        Args:
+            values: JSON values.
+            source: What errors call the file.
+
         Raises:
-            ValueError: If a field is unknown, or a value is refused.
+            JsonError: If a field is unknown, missing or of another type, or a value is refused.
         """
-        parts = {
-            "grid": GridConfig,
-            "camera": CameraEncoderConfig,
-            "lidar": LidarEncoderConfig,
-            "planner": PlannerConfig,
-        }
-        given = dict(values)
-        for name, part in parts.items():
-            if isinstance(given.get(name), Mapping):
-                given[name] = _from_mapping(part, given[name])
-        return _from_mapping(cls, given)
-
-
-def _from_mapping(cls: type[T], values: Mapping[str, Any]) -> T:
-    known = [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
-    for name in values:
-        check_name(name, known, f"field of {cls.__name__}")
-    return cls(**values)
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+        return from_json(cls, values, source)
 
 
 _NO_PRIVILEGE = ("command", "target_point", "routing", "speed", "speed_history")

@@ -6,7 +6,6 @@ with the stride of a bottleneck in its 3x3 convolution as both libraries have it
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 
 import torch.nn.functional as F
@@ -96,12 +95,3 @@ class ResNet(nn.Module):
             x = self.get_submodule(f"layer{n}")(x)
             maps.append(x)
         return maps
-
-    def load_published(self, weights: Mapping[str, Tensor]) -> None:
-        """Loads ImageNet weights of timm or torchvision, strictly; their classifier is left out.
-
-        Raises:
-            RuntimeError: If a parameter is missing, left over, or of another shape.
-        """
-        kept = {name: value for name, value in weights.items() if not name.startswith("fc.")}
-        self.load_state_dict(OrderedDict(kept), strict=True)

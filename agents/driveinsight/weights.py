@@ -6,7 +6,6 @@ Weights are loaded strictly, and only into the configuration that they were save
 from __future__ import annotations
 
 import hashlib
-import json
 from pathlib import Path
 
 import safetensors.torch
@@ -15,6 +14,8 @@ from safetensors import SafetensorError
 
 from agents.driveinsight.config import FORMAT_VERSION, PolicyConfig
 from agents.driveinsight.model import Policy
+from di_envs.files.json_values import JsonError, indented, read_json
+from di_envs.files.whole import write_whole
 
 CONFIG_FILE = "config.json"
 WEIGHTS_FILE = "weights.safetensors"
@@ -33,14 +34,13 @@ def save_pretrained(policy: Policy, folder: Path, card: str) -> None:
         folder: Where to.
         card: Markdown: data, configuration, scores, limits.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     content = {"format_version": FORMAT_VERSION, **policy.config.to_mapping()}
-    (folder / CONFIG_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    (folder / CARD_FILE).write_text(card, encoding="utf-8")
+    write_whole(folder / CONFIG_FILE, indented(content))
+    write_whole(folder / CARD_FILE, card)
     weights = {
         name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()
     }
-    (folder / WEIGHTS_FILE).write_bytes(safetensors.torch.save(weights))
+    write_whole(folder / WEIGHTS_FILE, safetensors.torch.save(weights))
 
 
 def from_pretrained(folder: Path) -> Policy:
@@ -79,21 +79,19 @@ def read_config(folder: Path) -> PolicyConfig:
     """
     path = folder / CONFIG_FILE
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        version = content.pop("format_version")
-    except (OSError, ValueError, KeyError, AttributeError) as error:
-        raise WeightsError(
-            f"{path} cannot be read ({error!r}): give a folder that save_pretrained wrote"
-        ) from error
+        content = read_json(path)
+    except JsonError as error:
+        raise WeightsError(f"{error}: give a folder that save_pretrained wrote") from error
+    version = content.pop("format_version", None) if isinstance(content, dict) else None
     if version != FORMAT_VERSION:
         raise WeightsError(
             f"{path} is of format {version}, this program reads {FORMAT_VERSION}: train again, or "
             f"install the release that wrote it"
         )
     try:
-        return PolicyConfig.from_mapping(content)
-    except (ValueError, TypeError) as error:
-        raise WeightsError(f"{path} is no policy configuration: {error}") from error
+        return PolicyConfig.from_mapping(content, str(path))
+    except JsonError as error:
+        raise WeightsError(f"{error}: give a folder that save_pretrained wrote") from error
 
 
 def weights_digest(folder: Path) -> str:

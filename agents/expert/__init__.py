@@ -1,1 +1,14 @@
-"""The agent `expert`: rules over the true state of the world, as kernels."""
+"""The agent `expert`: rules over the true state of the world, as kernels.
+
+    legs -> base_line, target_speed -> path       the line to drive, made once a route
+    surroundings                                  what kernels read of the world
+    progress                                      where the car is on the path, and its memory
+    sight, people, actors                         who is on the path, beside it, at the junction
+    speed, rules, junction                        accelerations that all of these allow
+    decision, control                             the least of them, and the wheel: one decision
+    agent                                         the agent around the kernels
+
+Where a name says no unit: speeds are in m/s, accelerations in m/s2, lengths, distances and gaps in
+m, yaws in rad. A station is metres along the path, an offset metres to its right; `times` (M,) are
+the seconds in which the car is 0, 1, 2, … metres on, from `speed.forecast`.
+"""

@@ -1,13 +1,16 @@
-# mypy: disallow_untyped_defs=False
 """Everybody else, seen from the expert's path: leaders and gaps, as kernels."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from agents.expert.line import height_at, project
-from agents.expert.path import STEP_M
+from agents.expert.base_line import STEP_M
+from agents.expert.config import ExpertNumbers
+from agents.expert.junction import JunctionAhead
+from agents.expert.path import DrivePath
 from agents.expert.people import SPARE_S, is_on_foot, note_person
+from agents.expert.progress import Progress, height_at, project
 from agents.expert.sight import (
     BEST,
     FRONT_OK,
@@ -16,8 +19,12 @@ from agents.expert.sight import (
     LEADER_SPEED,
     REAR_OK,
     ROOM_M,
+    Seen,
+    Sight,
 )
 from agents.expert.speed import follow
+from agents.expert.surroundings import Actors, Ways
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.kernels import kernel
 from di_envs.world.state import ActorKind
@@ -39,7 +46,7 @@ _ABSENT, _PROP, _DEBRIS = (
 
 
 @kernel
-def behind_leader(gap_m, speed, leader_speed, numbers):
+def behind_leader(gap_m: float, speed: float, leader_speed: float, numbers: ExpertNumbers) -> float:
     """Acceleration behind a leader: the driver model's, and never too fast to stop behind it."""
     room = max(gap_m - 0.7, 0.0) + leader_speed * leader_speed / (2.0 * LEADER_BRAKING_MPS2)
     braking = numbers.emergency_mps2 - 1.0
@@ -51,53 +58,142 @@ def behind_leader(gap_m, speed, leader_speed, numbers):
     )
 
 
+class Shadow(NamedTuple):
+    """A vehicle laid onto the path: the stretch that it covers, and how it moves there."""
+
+    rear_m: float  # stations of the path
+    front_m: float
+    half_width_m: float  # across the path
+    offset_m: float  # of its middle, from the lane that it is on …
+    aside_m: float  # … and from the one that it leaves, while it changes lanes
+    along_mps: float
+    across_mps: float
+
+
 @kernel
-def _note_vehicle(sight, actors, actor, ego, station, offset, turn, progress, shift, span, numbers):
-    """Follows a vehicle on the path; notes gaps beside it and room beyond the junction."""
-    number, speed = sight.number, actors.speed[ego]
-    cos, sin = math.cos(turn), math.sin(turn)
-    length = actors.half_length[actor] * abs(cos) + actors.half_width[actor] * abs(sin)
-    width = actors.half_length[actor] * abs(sin) + actors.half_width[actor] * abs(cos)
-    along, across = actors.speed[actor] * cos, actors.speed[actor] * sin
-    half = actors.half_length[ego]
-    rear, front = station - length, station + length
-    # A vehicle that changes lanes counts on the lane that it leaves and on the one that it enters.
-    aside = offset - actors.lateral_m[actor] if actors.changing_from[actor] >= 0 else offset
-    if shift != 0.0:
-        beside = min(abs(offset + shift), abs(aside + shift)) - width
-        if beside < actors.half_width[ego] + 0.2:
-            _note_gap(sight, actors, ego, rear, front, along, progress, numbers)
-    reach = actors.half_width[ego] + width
-    if actors.kind[actor] < _PROP:  # poles stand close to where one drives, and stay there
+def _shadow_of(actors: Actors, seen: Seen) -> Shadow:
+    """A vehicle laid onto the path.
+
+    One that changes lanes counts on the lane that it leaves and on the one that it enters.
+    """
+    actor = seen.actor
+    cos, sin = math.cos(seen.turn_rad), math.sin(seen.turn_rad)
+    half_length, half_width = actors.half_length[actor], actors.half_width[actor]
+    length = half_length * abs(cos) + half_width * abs(sin)
+    aside = seen.offset_m
+    if actors.changing_from[actor] >= 0:
+        aside = seen.offset_m - actors.lateral_m[actor]
+    return Shadow(
+        seen.station_m - length,
+        seen.station_m + length,
+        half_length * abs(sin) + half_width * abs(cos),
+        seen.offset_m,
+        aside,
+        actors.speed[actor] * cos,
+        actors.speed[actor] * sin,
+    )
+
+
+@kernel
+def _note_vehicle(
+    sight: Sight,
+    actors: Actors,
+    seen: Seen,
+    ego: int,
+    progress: Progress,
+    shift: float,
+    ahead: JunctionAhead,
+    numbers: ExpertNumbers,
+) -> None:
+    """Follows a vehicle on the path; notes gaps beside it and room beyond the junction.
+
+    Args:
+        sight: What the car knows so far; changed.
+        actors: Everybody.
+        seen: The vehicle.
+        ego: The car.
+        progress: Where the car is on the path.
+        shift: As of `look`.
+        ahead: The next junction.
+        numbers: From `ExpertConfig`.
+    """
+    shadow = _shadow_of(actors, seen)
+    if shift != 0.0 and _is_beside(shadow, shift, actors.half_width[ego]):
+        _note_gap(sight, actors, ego, shadow, progress, numbers)
+    reach = actors.half_width[ego] + shadow.half_width_m
+    if actors.kind[seen.actor] < _PROP:  # poles stand close to where one drives, and stay there
         reach += numbers.side_margin_m
-    if min(abs(offset), abs(aside)) >= reach or front <= progress.station_m:
+    on_path = min(abs(shadow.offset_m), abs(shadow.aside_m)) < reach
+    if not on_path or shadow.front_m <= progress.station_m:
         return
-    gap = rear - progress.station_m - half
-    if shift != 0.0 and along < speed + 1.0:  # it must pull out behind this one
+    speed = actors.speed[ego]
+    gap = shadow.rear_m - progress.station_m - actors.half_length[ego]
+    if shift != 0.0 and shadow.along_mps < speed + 1.0:  # it must pull out behind this one
         if gap < PULL_OUT_M:
-            number[FRONT_OK] = 0.0
+            sight.number[FRONT_OK] = 0.0
         gap -= PULL_OUT_M - numbers.standstill_gap_m
-    if abs(turn) > CROSSING_RAD and abs(across) > 1.0:
-        leaving = (reach - math.copysign(offset, across * offset)) / abs(across)
-        if gap > (leaving + SPARE_S) * speed + BLOCKED_GAP_M:
-            return
-    number[BEST] = min(number[BEST], behind_leader(gap, speed, max(along, 0.0), numbers))
-    if rear < number[LEADER_REAR]:
-        number[LEADER_REAR] = rear
-        number[LEADER_SPEED] = max(along, 0.0)
-    if rear > span[1]:
-        number[ROOM_M] = min(number[ROOM_M], rear + along * along / 8.0 - span[1])
-    elif front > span[0]:
-        number[INSIDE_M] += 2.0 * actors.half_length[actor] + numbers.exit_gap_m
+    if abs(seen.turn_rad) > CROSSING_RAD and _is_gone_by_then(shadow, reach, gap, speed):
+        return
+    _note_leader(sight, shadow, gap, speed, numbers)
+    _note_room(sight, shadow, 2.0 * actors.half_length[seen.actor], ahead, numbers)
 
 
 @kernel
-def _note_gap(sight, actors, ego, rear, front, along, progress, numbers):
+def _is_beside(shadow: Shadow, shift: float, half_width: float) -> bool:
+    """Whether a vehicle is on the lane to change to, beside a car that is so wide."""
+    off_lane = min(abs(shadow.offset_m + shift), abs(shadow.aside_m + shift))
+    return off_lane - shadow.half_width_m < half_width + 0.2
+
+
+@kernel
+def _is_gone_by_then(shadow: Shadow, reach: float, gap: float, speed: float) -> bool:
+    """Whether a vehicle that crosses the path has left it, `reach` wide, when the car comes."""
+    across = abs(shadow.across_mps)
+    if across <= 1.0:
+        return False
+    leaving = (reach - math.copysign(shadow.offset_m, shadow.across_mps * shadow.offset_m)) / across
+    return gap > (leaving + SPARE_S) * speed + BLOCKED_GAP_M
+
+
+@kernel
+def _note_leader(
+    sight: Sight, shadow: Shadow, gap: float, speed: float, numbers: ExpertNumbers
+) -> None:
+    """Keeps behind a vehicle on the path, and remembers the nearest one."""
+    number, leader_speed = sight.number, max(shadow.along_mps, 0.0)
+    number[BEST] = min(number[BEST], behind_leader(gap, speed, leader_speed, numbers))
+    if shadow.rear_m < number[LEADER_REAR]:
+        number[LEADER_REAR] = shadow.rear_m
+        number[LEADER_SPEED] = leader_speed
+
+
+@kernel
+def _note_room(
+    sight: Sight, shadow: Shadow, length: float, ahead: JunctionAhead, numbers: ExpertNumbers
+) -> None:
+    """Notes how far behind the junction a vehicle is, or that one inside will need room there."""
+    number = sight.number
+    if shadow.rear_m > ahead.end_m:
+        along = shadow.along_mps
+        number[ROOM_M] = min(number[ROOM_M], shadow.rear_m + along * along / 8.0 - ahead.end_m)
+    elif shadow.front_m > ahead.begin_m:
+        number[INSIDE_M] += length + numbers.exit_gap_m
+
+
+@kernel
+def _note_gap(
+    sight: Sight,
+    actors: Actors,
+    ego: int,
+    shadow: Shadow,
+    progress: Progress,
+    numbers: ExpertNumbers,
+) -> None:
     """Whether a vehicle on the lane to change to leaves the gap free."""
-    speed, half = actors.speed[ego], actors.half_length[ego]
-    ahead = rear - progress.station_m - half
-    behind = progress.station_m - half - front
-    if rear + front > 2.0 * progress.station_m:
+    speed, half, along = actors.speed[ego], actors.half_length[ego], shadow.along_mps
+    ahead = shadow.rear_m - progress.station_m - half
+    behind = progress.station_m - half - shadow.front_m
+    if shadow.rear_m + shadow.front_m > 2.0 * progress.station_m:
         braking = -follow(max(ahead, 0.1), speed, along, numbers)
         if ahead < BLOCKED_GAP_M or braking > numbers.change_front_mps2:
             sight.number[FRONT_OK] = 0.0
@@ -111,24 +207,38 @@ def _note_gap(sight, actors, ego, rear, front, along, progress, numbers):
 
 
 @kernel
-def look(sight, path, progress, actors, ways, ego, shift, span, junction, times, numbers):
+def look(
+    sight: Sight,
+    path: DrivePath,
+    progress: Progress,
+    actors: Actors,
+    ways: Ways,
+    ego: int,
+    shift: float,
+    ahead: JunctionAhead,
+    times: Float64,
+    numbers: ExpertNumbers,
+) -> None:
     """Looks at all actors near the car.
 
     Args:
         sight: From `blank_sight`; filled.
-        shift: Offset of the present lane from the one to change to next, 0 where none is due.
-        span: Stations where the next junction begins and ends.
-        junction: Index of the junction that the car is on or comes to next, -1 for none.
+        path: The route's path.
+        progress: Where the car is on it.
+        actors: Everybody.
+        ways: The town's lanes.
+        ego: The car.
+        shift: Offset of the present lane from the one to change to next [m], 0 where none is due.
+        ahead: The next junction.
         times: From `forecast`.
+        numbers: From `ExpertConfig`.
     """
-    speed = actors.speed[ego]
-    reach = LOOK_M + LOOK_S * speed
+    reach = LOOK_M + LOOK_S * actors.speed[ego]
     here = int(progress.station_m / STEP_M)
     begin = max(here - int(BACK_M / STEP_M), 0)
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
     for actor in range(actors.kind.size):
-        kind = actors.kind[actor]
-        if actor == ego or kind in (_ABSENT, _DEBRIS):
+        if actor == ego or actors.kind[actor] in (_ABSENT, _DEBRIS):
             continue
         dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
         if dx * dx + dy * dy > reach * reach:
@@ -137,14 +247,19 @@ def look(sight, path, progress, actors, ways, ego, shift, span, junction, times,
         # Levels are those of the path there: roads climb.
         if abs(actors.z[actor] - height_at(path, station)) > LEVEL_M:
             continue
-        turn = wrap_angle(actors.yaw[actor] - yaw)
+        seen = Seen(actor, station, offset, wrap_angle(actors.yaw[actor] - yaw))
         if is_on_foot(actors, actor):
-            note_person(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
+            note_person(sight, actors, seen, ego, progress, times, numbers)
             continue
-        _note_vehicle(
-            sight, actors, actor, ego, station, offset, turn, progress, shift, span, numbers
-        )
+        _note_vehicle(sight, actors, seen, ego, progress, shift, ahead, numbers)
         way = actors.grant[actor]
-        if way >= 0 and ways.junction[way] == junction and sight.holders[0] < sight.holder.size:
-            sight.holder[sight.holders[0]] = actor
-            sight.holders[0] += 1
+        if way >= 0 and ways.junction[way] == ahead.junction:
+            _note_holder(sight, actor)
+
+
+@kernel
+def _note_holder(sight: Sight, actor: int) -> None:
+    """Remembers somebody who may cross the next junction, as long as there is room for him."""
+    if sight.holders[0] < sight.holder.size:
+        sight.holder[sight.holders[0]] = actor
+        sight.holders[0] += 1

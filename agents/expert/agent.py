@@ -16,9 +16,9 @@ import numpy as np
 from agents.base import Control, Observation, Requirements, WorldView
 from agents.expert.config import ExpertConfig
 from agents.expert.decision import decide, start_progress
-from agents.expert.line import Progress
 from agents.expert.path import DrivePath, build_path
-from agents.expert.scene import actors_of, lights_of, ways_of
+from agents.expert.progress import Progress
+from agents.expert.surroundings import actors_of, lights_of, ways_of
 from di_envs.town.plan import RoutePlan
 from di_envs.world.dynamics import EgoModel
 

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Steering along the path, as a kernel.
 
 It inverts the ego's own model (`di_envs.world.dynamics`), so little is left to feedback.
@@ -8,10 +7,12 @@ from __future__ import annotations
 
 import math
 
-from agents.expert.line import pose_at, project
-from agents.expert.path import STEP_M
+from agents.expert.base_line import STEP_M
+from agents.expert.path import DrivePath
+from agents.expert.progress import Progress, pose_at, project
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.kernels import kernel
+from di_envs.world.dynamics import EgoParameters
 
 SHORTEST_LENGTH_M = 2.0  # over which an offset from the path is driven back, at walking pace
 LENGTH_TIME_S = 0.4  # and per m/s of speed
@@ -19,7 +20,15 @@ LEAD_S = 0.15  # from a decision to the wheel: the actuator's lag and half a dec
 
 
 @kernel
-def steering(path, progress, x, y, yaw, speed, model):
+def steering(
+    path: DrivePath,
+    progress: Progress,
+    x: float,
+    y: float,
+    yaw: float,
+    speed: float,
+    model: EgoParameters,
+) -> float:
     """Wheel position -1..1 that leads the car back onto the path and along it.
 
     The point that the model never moves sideways, `rear_axle_m` behind the centre, obeys

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One decision of the expert, as a kernel: where am I, may I change lanes, how fast, which way."""
 
 from __future__ import annotations
@@ -6,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from agents.expert.actors import look
+from agents.expert.config import ExpertNumbers
 from agents.expert.control import steering
 from agents.expert.junction import crossing_acceleration, exit_acceleration, junction_ahead
-from agents.expert.line import Progress, localise
-from agents.expert.path import CHANGE_END_M, CHANGE_ROOM_M
+from agents.expert.path import CHANGE_END_M, CHANGE_ROOM_M, DrivePath
+from agents.expert.progress import Progress, localise
 from agents.expert.rules import line_acceleration, next_line, stands_at
 from agents.expert.sight import (
     BEST,
@@ -20,8 +20,9 @@ from agents.expert.sight import (
     blank_sight,
 )
 from agents.expert.speed import cruise, forecast, stop_within
+from agents.expert.surroundings import Actors, Lights, Ways
 from di_envs.numerics.kernels import kernel
-from di_envs.world.dynamics import pedals
+from di_envs.world.dynamics import EgoParameters, pedals
 
 FORECAST_M = 100
 LONGEST_CHANGE_M = 45.0
@@ -31,13 +32,21 @@ MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls 
 
 
 @kernel
-def start_progress():
+def start_progress() -> Progress:
     """The memory at a path's start."""
     return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0)
 
 
 @kernel
-def update_progress(path, progress, x, y, speed, half_length, numbers):
+def update_progress(
+    path: DrivePath,
+    progress: Progress,
+    x: float,
+    y: float,
+    speed: float,
+    half_length: float,
+    numbers: ExpertNumbers,
+) -> Progress:
     """The memory, brought up to where the car is now."""
     station, _, _ = localise(path, progress, x, y)
     line = next_line(path, progress.line, station - half_length)
@@ -56,8 +65,8 @@ def update_progress(path, progress, x, y, speed, half_length, numbers):
 
 
 @kernel
-def change_due(path, progress, speed):
-    """Offset of the present lane from the one to change to, if that is due soon, else 0."""
+def change_due(path: DrivePath, progress: Progress, speed: float) -> float:
+    """Offset [m] of the present lane from the one to change to, if that is due soon, else 0."""
     k = progress.changes
     if k >= path.change_jump_m.size:
         return 0.0
@@ -70,7 +79,9 @@ def change_due(path, progress, speed):
 
 
 @kernel
-def begin_change(path, progress, speed, free, numbers):
+def begin_change(
+    path: DrivePath, progress: Progress, speed: float, free: bool, numbers: ExpertNumbers
+) -> Progress:
     """Commits to the next lane change if its gap is free and its time has come."""
     k = progress.changes
     if not free or progress.station_m < path.change_jump_m[k]:
@@ -97,7 +108,9 @@ def begin_change(path, progress, speed, free, numbers):
 
 
 @kernel
-def wait_for_gap(path, progress, speed, beside, numbers):
+def wait_for_gap(
+    path: DrivePath, progress: Progress, speed: float, beside: bool, numbers: ExpertNumbers
+) -> float:
     """Acceleration while a lane change is due and its gap is not free."""
     latest = path.change_latest_m[progress.changes] - progress.station_m
     best = stop_within(latest, speed, numbers)
@@ -107,13 +120,22 @@ def wait_for_gap(path, progress, speed, beside, numbers):
 
 
 @kernel
-def decide(path, progress, actors, ways, lights, ego, numbers, model):
+def decide(
+    path: DrivePath,
+    progress: Progress,
+    actors: Actors,
+    ways: Ways,
+    lights: Lights,
+    ego: int,
+    numbers: ExpertNumbers,
+    model: EgoParameters,
+) -> tuple[float, float, float, Progress]:
     """The control of one decision.
 
     Args:
         path: The route's path.
         progress: The memory.
-        actors, ways, lights: What is seen of the world (`expert_scene`), only read.
+        actors, ways, lights: What is seen of the world (`surroundings`), only read.
         ego: Index of the ego.
         numbers: From `ExpertConfig`.
         model: From `EgoModel`.
@@ -126,23 +148,11 @@ def decide(path, progress, actors, ways, lights, ego, numbers, model):
     progress = update_progress(path, progress, x, y, speed, half, numbers)
     times = np.empty(FORECAST_M)
     forecast(path, progress.station_m, speed, numbers, times)
-    junction, first, last, begin_m, end_m = junction_ahead(path, progress, half)
+    ahead = junction_ahead(path, progress, half)
     sight = blank_sight()
     shift = change_due(path, progress, speed)
     if not numbers.ignore_actors:
-        look(
-            sight,
-            path,
-            progress,
-            actors,
-            ways,
-            ego,
-            shift,
-            (begin_m, end_m),
-            junction,
-            times,
-            numbers,
-        )
+        look(sight, path, progress, actors, ways, ego, shift, ahead, times, numbers)
     best = min(cruise(path, progress.station_m, speed, numbers), sight.number[BEST])
     if shift != 0.0:
         beside = sight.number[REAR_OK] == 0.0
@@ -151,18 +161,14 @@ def decide(path, progress, actors, ways, lights, ego, numbers, model):
         if not free:
             best = min(best, wait_for_gap(path, progress, speed, beside, numbers))
     queue = (sight.number[LEADER_REAR], sight.number[LEADER_SPEED])
-    best = min(
-        best,
-        line_acceleration(path, progress, lights, speed, half, times, queue, numbers),
-    )
-    if junction >= 0 and not numbers.ignore_actors:
+    lines = line_acceleration(path, progress, lights, speed, half, times, queue, numbers)
+    best = min(best, lines)
+    if ahead.junction >= 0 and not numbers.ignore_actors:
         front = progress.station_m + half
         best = min(
             best,
-            crossing_acceleration(
-                sight, path, progress, actors, ways, ego, first, last, begin_m, times, numbers
-            ),
-            exit_acceleration(sight, begin_m, front, half, speed, numbers),
+            crossing_acceleration(sight, path, progress, actors, ways, ego, ahead, times, numbers),
+            exit_acceleration(sight, ahead.begin_m, front, half, speed, numbers),
         )
     best = min(max(best, -numbers.emergency_mps2), numbers.acceleration_mps2)
     throttle, brake = pedals(best, speed, model)

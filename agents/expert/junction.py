@@ -1,10 +1,14 @@
-# mypy: disallow_untyped_defs=False
 """Junctions: enter only with room behind, and never into the way of those who cross, as kernels."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from agents.expert.config import ExpertNumbers
+from agents.expert.path import DrivePath
+from agents.expert.progress import Progress
 from agents.expert.rules import PAST_LINE_M
-from agents.expert.sight import INSIDE_M, ROOM_M
+from agents.expert.sight import INSIDE_M, ROOM_M, Sight
 from agents.expert.speed import (
     NO_LIMIT_MPS2,
     braking_needed,
@@ -12,6 +16,9 @@ from agents.expert.speed import (
     time_over,
     time_to,
 )
+from agents.expert.surroundings import Actors, Ways
+from di_envs.numerics.arrays import Float64
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.state import PATH_LANES
 
@@ -20,13 +27,19 @@ SOON_MPS2, LATE_MPS2 = 3.0, 1.0  # others gain speed at most, and at least, this
 COMMITTED_MPS2 = 7.0  # who would have to brake harder than this goes on
 
 
-@kernel
-def junction_ahead(path, progress, half_length):
-    """The junction that the car's tail has not left yet.
+class JunctionAhead(NamedTuple):
+    """The next junction on the path, or the one that the car is on."""
 
-    Returns:
-        (junction index or -1, first leg, leg behind the last, begin station, end station).
-    """
+    junction: int  # -1 for none
+    first_leg: int
+    end_leg: int  # behind the last
+    begin_m: float  # stations of the path
+    end_m: float
+
+
+@kernel
+def junction_ahead(path: DrivePath, progress: Progress, half_length: float) -> JunctionAhead:
+    """The junction that the car's tail has not left yet."""
     tail = progress.station_m - half_length
     for first in range(path.leg_lane.size):
         if path.leg_junction[first] < 0 or path.leg_end_m[first] < tail:
@@ -34,12 +47,13 @@ def junction_ahead(path, progress, half_length):
         junction, last = path.leg_junction[first], first
         while last < path.leg_lane.size and path.leg_junction[last] == junction:
             last += 1
-        return junction, first, last, path.leg_begin_m[first], path.leg_end_m[last - 1]
-    return -1, 0, 0, 1e9, 1e9
+        begin_m, end_m = path.leg_begin_m[first], path.leg_end_m[last - 1]
+        return JunctionAhead(as_int64(junction), first, last, begin_m, end_m)
+    return JunctionAhead(as_int64(-1), 0, 0, 1e9, 1e9)
 
 
 @kernel
-def station_on(actors, ways, actor, way):
+def station_on(actors: Actors, ways: Ways, actor: int, way: int) -> float:
     """Station of a vehicle's centre on a junction lane of its path; negative before it.
 
     Very large if the vehicle has left it behind or does not go there.
@@ -61,7 +75,8 @@ def station_on(actors, ways, actor, way):
 
 
 @kernel
-def _share_start(ways, a, b):
+def _share_start(ways: Ways, a: int, b: int) -> bool:
+    """Whether two junction lanes begin at the same lane."""
     for i in range(ways.predecessor_start[a], ways.predecessor_start[a + 1]):
         for j in range(ways.predecessor_start[b], ways.predecessor_start[b + 1]):
             if ways.predecessor[i] == ways.predecessor[j]:
@@ -70,7 +85,18 @@ def _share_start(ways, a, b):
 
 
 @kernel
-def _meets(actors, ways, actor, conflict, begin_m, end_m, progress, half, times, numbers):
+def _meets(
+    actors: Actors,
+    ways: Ways,
+    actor: int,
+    conflict: int,
+    begin_m: float,
+    end_m: float,
+    progress: Progress,
+    half: float,
+    times: Float64,
+    numbers: ExpertNumbers,
+) -> bool:
     """Whether a vehicle and the car would be in a crossing place at the same time.
 
     Args:
@@ -93,41 +119,91 @@ def _meets(actors, ways, actor, conflict, begin_m, end_m, progress, half, times,
 
 @kernel
 def crossing_acceleration(
-    sight, path, progress, actors, ways, ego, first, last, begin_m, times, numbers
-):
-    """What those who hold a grant for a crossing way allow."""
+    sight: Sight,
+    path: DrivePath,
+    progress: Progress,
+    actors: Actors,
+    ways: Ways,
+    ego: int,
+    ahead: JunctionAhead,
+    times: Float64,
+    numbers: ExpertNumbers,
+) -> float:
+    """What those who hold a grant for a crossing way allow.
+
+    Args:
+        sight: From `look`.
+        path: The route's path.
+        progress: Where the car is on it.
+        actors: Everybody.
+        ways: The town's lanes.
+        ego: The car.
+        ahead: The junction.
+        times: From `forecast`.
+        numbers: From `ExpertConfig`.
+
+    Returns:
+        Acceleration [m/s2].
+    """
     best = NO_LIMIT_MPS2
-    half, speed = actors.half_length[ego], actors.speed[ego]
-    front = progress.station_m + half
-    for leg in range(first, last):
-        lane = path.leg_lane[leg]
+    half = actors.half_length[ego]
+    for leg in range(ahead.first_leg, ahead.end_leg):
+        lane, offset_m = path.leg_lane[leg], path.leg_offset_m[leg]
         for k in range(ways.conflict_start[lane], ways.conflict_start[lane + 1]):
-            way = ways.conflict_lane[k]
-            zone_begin = ways.conflict_begin_m[k] + path.leg_offset_m[leg]
-            zone_end = ways.conflict_end_m[k] + path.leg_offset_m[leg]
-            if zone_end < progress.station_m - half or front > zone_begin + ZONE_MARGIN_M:
+            begin_m, end_m = ways.conflict_begin_m[k] + offset_m, ways.conflict_end_m[k] + offset_m
+            behind = end_m < progress.station_m - half
+            if behind or progress.station_m + half > begin_m + ZONE_MARGIN_M:
                 continue  # left behind, or already in it: then the others wait
-            if _share_start(ways, lane, way):
+            if _share_start(ways, lane, ways.conflict_lane[k]):
                 continue  # they part from the car's own lane: leaders or followers
             for i in range(sight.holders[0]):
                 actor = sight.holder[i]
-                if not _meets(
-                    actors, ways, actor, k, zone_begin, zone_end, progress, half, times, numbers
-                ):
-                    continue
-                stop = zone_begin - ZONE_MARGIN_M
-                line = begin_m - numbers.line_margin_m
-                if front < begin_m + PAST_LINE_M and (
-                    braking_needed(line - front, speed) < COMMITTED_MPS2 or speed < 0.5
-                ):
-                    stop = min(stop, line)
-                if braking_needed(stop - front, speed) < COMMITTED_MPS2 or speed < 0.5:
-                    best = min(best, stop_within(stop - front, speed, numbers))
+                if _meets(actors, ways, actor, k, begin_m, end_m, progress, half, times, numbers):
+                    front_m, speed = progress.station_m + half, actors.speed[ego]
+                    wait = _wait_before(begin_m, ahead.begin_m, front_m, speed, numbers)
+                    best = min(best, wait)
     return best
 
 
 @kernel
-def exit_acceleration(sight, begin_m, front_m, half_length, speed, numbers):
+def _wait_before(
+    place_m: float, junction_m: float, front_m: float, speed: float, numbers: ExpertNumbers
+) -> float:
+    """Stops before a crossing place, or better before the junction, if there is still time.
+
+    Args:
+        place_m: Station where the place begins.
+        junction_m: Station where the junction begins.
+        front_m: Station of the car's front.
+        speed: The car's [m/s].
+        numbers: From `ExpertConfig`.
+
+    Returns:
+        Acceleration [m/s2].
+    """
+    stop_m, line_m = place_m - ZONE_MARGIN_M, junction_m - numbers.line_margin_m
+    if front_m < junction_m + PAST_LINE_M and _can_still_wait(line_m - front_m, speed):
+        stop_m = min(stop_m, line_m)
+    if _can_still_wait(stop_m - front_m, speed):
+        return stop_within(stop_m - front_m, speed, numbers)
+    return NO_LIMIT_MPS2
+
+
+@kernel
+def _can_still_wait(distance_m: float, speed: float) -> bool:
+    """Whether the car is not yet committed to going on past a place."""
+    return braking_needed(distance_m, speed) < COMMITTED_MPS2 or speed < 0.5
+
+
+@kernel
+def exit_acceleration(
+    sight: Sight,
+    begin_m: float,
+    front_m: float,
+    half_length: float,
+    speed: float,
+    numbers: ExpertNumbers,
+) -> float:
     """Waits before a junction whose exit has no room for the car."""
     if front_m > begin_m + PAST_LINE_M:
         return NO_LIMIT_MPS2

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """People, seen from the expert's path: those who cross it, and those who may step out, as kernels.
 
 A cyclist who crosses the road off all lanes is taken for somebody on foot, only faster.
@@ -8,8 +7,12 @@ from __future__ import annotations
 
 import math
 
-from agents.expert.sight import BEST
+from agents.expert.config import ExpertNumbers
+from agents.expert.progress import Progress
+from agents.expert.sight import BEST, Seen, Sight
 from agents.expert.speed import stop_within, time_to
+from agents.expert.surroundings import Actors
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.state import ActorKind
 
@@ -26,25 +29,43 @@ _WALKER, _BICYCLE = int(ActorKind.WALKER), int(ActorKind.BICYCLE)
 
 
 @kernel
-def is_on_foot(actors, actor):
+def is_on_foot(actors: Actors, actor: int) -> bool:
     """Whether somebody walks, or rides where there is no lane."""
     kind = actors.kind[actor]
     return kind == _WALKER or (kind == _BICYCLE and actors.lane[actor] < 0)
 
 
 @kernel
-def note_person(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
+def note_person(
+    sight: Sight,
+    actors: Actors,
+    seen: Seen,
+    ego: int,
+    progress: Progress,
+    times: Float64,
+    numbers: ExpertNumbers,
+) -> None:
     """Stops before somebody on the path, or who will be when the car is there; else is wary."""
-    _note_crossing(sight, actors, actor, ego, station, offset, turn, progress, times, numbers)
-    if actors.speed[actor] < STANDS_MPS and actors.walk_edge[actor] < 0:
-        _note_waiting(sight, actors, actor, ego, station, offset, turn, progress, numbers)
+    _note_crossing(sight, actors, seen, ego, progress, times, numbers)
+    if actors.speed[seen.actor] < STANDS_MPS and actors.walk_edge[seen.actor] < 0:
+        _note_waiting(sight, actors, seen, ego, progress, numbers)
 
 
 @kernel
-def _note_crossing(sight, actors, actor, ego, station, offset, turn, progress, times, numbers):
-    across = actors.speed[actor] * math.sin(turn)
-    along = actors.speed[actor] * math.cos(turn)
-    half, body = actors.half_length[ego], actors.half_length[actor]
+def _note_crossing(
+    sight: Sight,
+    actors: Actors,
+    seen: Seen,
+    ego: int,
+    progress: Progress,
+    times: Float64,
+    numbers: ExpertNumbers,
+) -> None:
+    """Stops before somebody on the path, or who will be when the car is there."""
+    station, offset = seen.station_m, seen.offset_m
+    across = actors.speed[seen.actor] * math.sin(seen.turn_rad)
+    along = actors.speed[seen.actor] * math.cos(seen.turn_rad)
+    half, body = actors.half_length[ego], actors.half_length[seen.actor]
     reach = actors.half_width[ego] + body + numbers.walker_margin_m
     enters, leaves = 0.0, LOOK_S
     if abs(across) > 0.2:
@@ -68,16 +89,20 @@ def _note_crossing(sight, actors, actor, ego, station, offset, turn, progress, t
 
 
 @kernel
-def _note_waiting(sight, actors, actor, ego, station, offset, turn, progress, numbers):
+def _note_waiting(
+    sight: Sight, actors: Actors, seen: Seen, ego: int, progress: Progress, numbers: ExpertNumbers
+) -> None:
     """Slows down for somebody who stands beside the road and faces it: he may step out.
 
     Those on walkways and crosswalks look out themselves before they step onto the road.
     """
-    towards = -math.copysign(math.sin(turn), offset * math.sin(turn))  # 1 straight at the path
+    offset, sine = seen.offset_m, math.sin(seen.turn_rad)
+    towards = -math.copysign(sine, offset * sine)  # 1 straight at the path
     if towards < FACING or abs(offset) > KERB_M:
         return
     speed = actors.speed[ego]
-    distance = station - actors.half_length[actor] - progress.station_m - actors.half_length[ego]
+    rear = seen.station_m - actors.half_length[seen.actor]
+    distance = rear - progress.station_m - actors.half_length[ego]
     if distance < 0.0:
         return
     step = WARY_MPS2 * numbers.dt_s

@@ -1,9 +1,13 @@
-# mypy: disallow_untyped_defs=False
 """Stop lines: red and yellow lights, and stop signs, as kernels."""
 
 from __future__ import annotations
 
+from agents.expert.config import ExpertNumbers
+from agents.expert.path import DrivePath
+from agents.expert.progress import Progress
 from agents.expert.speed import NO_LIMIT_MPS2, braking_needed, stop_within, time_to
+from agents.expert.surroundings import Lights
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
@@ -33,8 +37,8 @@ _RED = int(LightState.RED)
 
 
 @kernel
-def seconds_to_red(lights, signal):
-    """How long a light that is not red stays so; zero for a red one."""
+def seconds_to_red(lights: Lights, signal: int) -> float:
+    """How long a light that is not red stays so [s]; zero for a red one."""
     if lights.light[signal] == _RED:
         return 0.0
     ticks = lights.phase_ticks[lights.junction[signal]]
@@ -42,8 +46,8 @@ def seconds_to_red(lights, signal):
 
 
 @kernel
-def _green_held_s(left, times, line_ahead_m):
-    """How long a green that a scenario holds lasts: a short yellow follows once the car is near.
+def _green_held_s(left: float, times: Float64, line_ahead_m: float) -> float:
+    """How long [s] a green that a scenario holds lasts: a short yellow comes once the car is near.
 
     Nearer than that and still green, it stays so until the car has left the junction.
     """
@@ -55,15 +59,31 @@ def _green_held_s(left, times, line_ahead_m):
 
 @kernel
 def light_acceleration(
-    lights, signal, line_m, station_m, half_length, speed, times, queue, numbers
-):
+    lights: Lights,
+    signal: int,
+    line_m: float,
+    station_m: float,
+    half_length: float,
+    speed: float,
+    times: Float64,
+    queue: tuple[float, float],
+    numbers: ExpertNumbers,
+) -> float:
     """What a traffic light allows: over its line only if the tail will be over it before red.
 
     Args:
+        lights: All lights.
+        signal: This one.
         line_m: Station of the line.
         station_m: Station of the car's centre.
+        half_length: The car's [m].
+        speed: The car's [m/s].
         times: From `forecast`.
         queue: (station of the rear, speed) of the vehicle ahead, which the car cannot overtake.
+        numbers: From `ExpertConfig`.
+
+    Returns:
+        Acceleration [m/s2].
     """
     left = _green_held_s(seconds_to_red(lights, signal), times, line_m - station_m)
     distance = line_m - station_m - half_length
@@ -87,7 +107,7 @@ def light_acceleration(
 
 
 @kernel
-def _between_line_and_tail(line_ahead_m, half_length, speed):
+def _between_line_and_tail(line_ahead_m: float, half_length: float, speed: float) -> float:
     """Over the line with the front but not with the tail, a slow car waits for green there."""
     room = line_ahead_m + TAIL_FROM * half_length - TAIL_MARGIN_M
     if room < 0.0 or speed > CRAWLING_MPS:
@@ -97,8 +117,17 @@ def _between_line_and_tail(line_ahead_m, half_length, speed):
 
 
 @kernel
-def line_acceleration(path, progress, lights, speed, half_length, times, queue, numbers):
-    """What the stop lines ahead allow; arguments as of `light_acceleration`."""
+def line_acceleration(
+    path: DrivePath,
+    progress: Progress,
+    lights: Lights,
+    speed: float,
+    half_length: float,
+    times: Float64,
+    queue: tuple[float, float],
+    numbers: ExpertNumbers,
+) -> float:
+    """The acceleration that the stop lines ahead allow; arguments as of `light_acceleration`."""
     best = NO_LIMIT_MPS2
     station = progress.station_m
     front = station + half_length
@@ -120,15 +149,15 @@ def line_acceleration(path, progress, lights, speed, half_length, times, queue, 
 
 
 @kernel
-def next_line(path, line, tail_m):
-    """The first stop line, from `line` on, that the tail is not yet over."""
+def next_line(path: DrivePath, line: int, tail_m: float) -> int:
+    """The first stop line, from `line` on, that a tail at station `tail_m` is not yet over."""
     while line < path.line_m.size and tail_m - TAIL_M > path.line_m[line]:
         line += 1
     return line
 
 
 @kernel
-def stands_at(path, line, front_m, speed):
+def stands_at(path: DrivePath, line: int, front_m: float, speed: float) -> bool:
     """Whether the car stands at its next line."""
     if line >= path.line_m.size or speed > 0.05:
         return False

@@ -1,14 +1,13 @@
-# mypy: disallow_untyped_defs=False
-"""What the expert's looking round comes to: a few numbers, and who may cross a junction."""
+"""What the expert sees of others, and what looking round comes to: numbers, and who may cross."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.expert.speed import NO_LIMIT_MPS2
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
 
 FAR_M = 1e6
@@ -17,16 +16,25 @@ FAR_M = 1e6
 class Sight(NamedTuple):
     """What `look` finds: numbers by their place in `number`, and those who cross."""
 
-    number: NDArray[np.float64]  # (7,) see the constants below
-    holder: NDArray[np.int32]  # (32,) vehicles with a grant for a junction near
-    holders: NDArray[np.int32]  # (1,) how many
+    number: Float64  # (7,) see the constants below
+    holder: Int32  # (32,) vehicles with a grant for a junction near
+    holders: Int32  # (1,) how many
+
+
+class Seen(NamedTuple):
+    """Somebody seen from the path, at the place of the path that is beside him."""
+
+    actor: int
+    station_m: float  # of his middle
+    offset_m: float  # of his middle, positive to the right of the path
+    turn_rad: float  # from the path's direction to his
 
 
 BEST, LEADER_REAR, LEADER_SPEED, FRONT_OK, REAR_OK, INSIDE_M, ROOM_M = range(7)
 
 
 @kernel
-def blank_sight():
+def blank_sight() -> Sight:
     """Room for what `look` finds; nothing seen yet."""
     number = np.zeros(7)
     number[BEST] = NO_LIMIT_MPS2

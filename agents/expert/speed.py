@@ -1,11 +1,13 @@
-# mypy: disallow_untyped_defs=False
 """Accelerations that keep a speed, a gap or a stop, and a forecast of arrivals, as kernels."""
 
 from __future__ import annotations
 
 import math
 
-from agents.expert.line import speed_at
+from agents.expert.config import ExpertNumbers
+from agents.expert.path import DrivePath
+from agents.expert.progress import speed_at
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 
 NO_LIMIT_MPS2 = 100.0  # an acceleration that binds nobody
@@ -14,15 +16,15 @@ SLOWEST_MPS = 0.5  # a moving car's least speed in a forecast
 
 
 @kernel
-def cruise(path, station_m, speed, numbers):
-    """Acceleration towards the path's own speed."""
+def cruise(path: DrivePath, station_m: float, speed: float, numbers: ExpertNumbers) -> float:
+    """Acceleration [m/s2] towards the path's own speed."""
     target = speed_at(path, station_m + speed * numbers.dt_s)
     wanted = (target - speed) / numbers.dt_s
     return min(max(wanted, -1.5 * numbers.corner_braking_mps2), numbers.acceleration_mps2)
 
 
 @kernel
-def follow(gap_m, speed, leader_speed, numbers):
+def follow(gap_m: float, speed: float, leader_speed: float, numbers: ExpertNumbers) -> float:
     """The Intelligent Driver Model's answer to a leader, without its own cruise.
 
     Source: Treiber, Hennecke, Helbing: Congested traffic states in empirical observations and
@@ -30,6 +32,11 @@ def follow(gap_m, speed, leader_speed, numbers):
 
     Args:
         gap_m: From bumper to bumper.
+        speed, leader_speed: Along the path [m/s].
+        numbers: From `ExpertConfig`.
+
+    Returns:
+        Acceleration [m/s2].
     """
     comfort = 2.0 * math.sqrt(numbers.acceleration_mps2 * numbers.braking_mps2)
     dynamic = speed * numbers.time_gap_s + speed * (speed - leader_speed) / comfort
@@ -40,13 +47,13 @@ def follow(gap_m, speed, leader_speed, numbers):
 
 
 @kernel
-def braking_needed(distance_m, speed):
-    """Deceleration that stops within a distance."""
+def braking_needed(distance_m: float, speed: float) -> float:
+    """Deceleration [m/s2], positive, that stops within a distance."""
     return speed * speed / (2.0 * max(distance_m, 0.05))
 
 
 @kernel
-def stop_within(distance_m, speed, numbers):
+def stop_within(distance_m: float, speed: float, numbers: ExpertNumbers) -> float:
     """Acceleration that stops at a point `distance_m` ahead with the planned braking.
 
     It binds only once the point is as near as the braking distance; harder braking than planned is
@@ -62,8 +69,10 @@ def stop_within(distance_m, speed, numbers):
 
 
 @kernel
-def forecast(path, station_m, speed, numbers, times):
-    """Fills `times` with when the car is k metres on, if nothing but the path's speeds holds it."""
+def forecast(
+    path: DrivePath, station_m: float, speed: float, numbers: ExpertNumbers, times: Float64
+) -> None:
+    """Fills `times` (M,) with when [s] the car is 0, 1, 2, … m on, held by path speeds."""
     now, v = 0.0, speed
     for k in range(times.size):
         times[k] = now
@@ -74,8 +83,8 @@ def forecast(path, station_m, speed, numbers, times):
 
 
 @kernel
-def time_to(times, distance_m):
-    """When the car has gone a distance, from `forecast`; after its end, at 10 m/s."""
+def time_to(times: Float64, distance_m: float) -> float:
+    """When [s] the car has gone a distance, from `forecast` (M,); after its end, at 10 m/s."""
     if distance_m <= 0.0:
         return 0.0
     k = int(distance_m)
@@ -86,8 +95,8 @@ def time_to(times, distance_m):
 
 
 @kernel
-def time_over(distance_m, speed, acceleration):
-    """Time to go a distance from a speed, gaining speed evenly."""
+def time_over(distance_m: float, speed: float, acceleration: float) -> float:
+    """Time [s] to go a distance from a speed, gaining speed evenly."""
     if distance_m <= 0.0:
         return 0.0
     return (math.sqrt(speed * speed + 2.0 * acceleration * distance_m) - speed) / acceleration

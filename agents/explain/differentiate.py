@@ -15,8 +15,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from agents.base import Observation
-from agents.explain.protocol import Explainable, NotExplainableError
+from agents.base import Agent, Observation
+from agents.explain.protocol import Anatomy, Explainable, NotExplainableError, explainable
 from agents.one_thread import one_thread
 from di_envs.config import check_name
 
@@ -106,6 +106,29 @@ def _check(waypoints: Tensor) -> None:
             "the waypoints are not part of torch's graph: compute them without no_grad, "
             "inference_mode, detach or numpy on the way, and name taps that lie on it"
         )
+
+
+def differentiate_agent(
+    agent: Agent[Any],
+    observation: Observation,
+    memory: Any,
+    *taps_of: Callable[[Anatomy], Sequence[str]],
+) -> tuple[Anatomy, Differentiated]:
+    """The same for an agent, at taps that its policy's anatomy names; attention is watched.
+
+    Args:
+        agent: With a method `explainable()`, see `protocol`.
+        observation: As `act` was given it.
+        memory: As `act` was given it; neither is changed.
+        taps_of: What names taps of an anatomy, such as `responses.group_taps`.
+
+    Raises:
+        NotExplainableError: If its policy cannot be looked into.
+    """
+    policy = explainable(agent)
+    anatomy = policy.anatomy
+    taps = [tap for named in taps_of for tap in named(anatomy)]
+    return anatomy, differentiate(policy, observation, memory, taps=taps, watched=anatomy.attention)
 
 
 @contextmanager

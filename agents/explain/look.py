@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from agents.base import Agent, Observation
 from agents.explain.activation import map_taps, maps_of
-from agents.explain.differentiate import differentiate
-from agents.explain.protocol import explainable
+from agents.explain.differentiate import differentiate_agent
 from agents.explain.responses import Response, group_taps, response_of
 
 
@@ -30,23 +29,6 @@ class Look:
 
 
 def look_at(agent: Agent[Any], observation: Observation, memory: Any) -> Look:
-    """Looks at one decision.
-
-    Args:
-        agent: With a method `explainable()`, see `protocol`.
-        observation: As `act` was given it.
-        memory: As `act` was given it; neither is changed.
-
-    Raises:
-        NotExplainableError: If its policy cannot be looked into.
-    """
-    policy = explainable(agent)
-    anatomy = policy.anatomy
-    passed = differentiate(
-        policy,
-        observation,
-        memory,
-        taps=(*group_taps(anatomy), *map_taps(anatomy)),
-        watched=anatomy.attention,
-    )
+    """Looks at one decision; arguments and errors are those of `differentiate_agent`."""
+    anatomy, passed = differentiate_agent(agent, observation, memory, group_taps, map_taps)
     return Look(response=response_of(anatomy, passed), maps=maps_of(anatomy, passed))

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from agents.base import Agent, Observation
-from agents.explain.differentiate import Differentiated, differentiate
-from agents.explain.protocol import Anatomy, Explainable, Span, TokenGroup, explainable
+from agents.explain.differentiate import Differentiated, differentiate, differentiate_agent
+from agents.explain.protocol import Anatomy, Explainable, Span, TokenGroup
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,22 +46,8 @@ class Response:
 
 
 def responses_at(agent: Agent[Any], observation: Observation, memory: Any) -> Response:
-    """What an agent's decision responds to.
-
-    Args:
-        agent: With a method `explainable()`, see `protocol`.
-        observation: As `act` was given it.
-        memory: As `act` was given it; neither is changed.
-
-    Raises:
-        NotExplainableError: If its policy cannot be looked into.
-    """
-    policy = explainable(agent)
-    anatomy = policy.anatomy
-    passed = differentiate(
-        policy, observation, memory, taps=group_taps(anatomy), watched=anatomy.attention
-    )
-    return response_of(anatomy, passed)
+    """What a decision responds to; arguments and errors are those of `differentiate_agent`."""
+    return response_of(*differentiate_agent(agent, observation, memory, group_taps))
 
 
 def token_gradients(

@@ -121,7 +121,7 @@ def _read_data(name: str, path: Path) -> Mapping[str, Any]:
     try:
         with zipfile.ZipFile(path) as archive:
             data = json.loads(archive.read("data"))
-    except (zipfile.BadZipFile, KeyError, ValueError) as error:
+    except (zipfile.BadZipFile, KeyError, ValueError, RecursionError) as error:
         raise AgentSpecError(
             f"agent '{name}': expected a zip file that a Stable-Baselines3 model was saved in "
             f"(model.save), got something else: {error}."

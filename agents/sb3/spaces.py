@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from di_envs.config import OBSERVATION_GROUPS
+from di_envs.files.names import name_hint
 from di_envs.observation import observation_space
 from di_envs.sensors.camera.config import RIGS
 from di_envs.sensors.lidar.config import LIDARS
@@ -142,6 +142,4 @@ def _described(space: spaces.Space[Any] | None) -> str:
 
 def _unknown(names: list[str]) -> str:
     known = [name for group in OBSERVATION_GROUPS for name in sorted(_names_of(group))]
-    near = difflib.get_close_matches(names[0], known, n=1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"it reads '{names[0]}', which we do not offer; {hint}known: {', '.join(known)}."
+    return f"it reads '{names[0]}', which we do not offer; {name_hint(names[0], known)}."

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What truly lies in each BEV cell: the teacher of the BEV features.
 
 Road and lines come from the ground that cameras see, so the teacher never names what is not shown.
@@ -13,12 +12,14 @@ from numpy.typing import NDArray
 
 from agents.driveinsight.config import GridConfig
 from agents.driveinsight.semantics import BevClass
+from di_envs.numerics.arrays import Float64, UInt8
 from di_envs.numerics.kernels import kernel
+from di_envs.sensors.scene.raster import TEXEL_M, Raster, Rectangle
 from di_envs.sensors.scene.scene import scene_of
-from di_envs.sensors.scene.surfaces import TEXEL_M
 from di_envs.sensors.scene.tags import TAG_BITS, Tag
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.kinds import ActorKind
+from di_envs.world.state import State
 from di_envs.world.world import WorldView
 
 SAMPLES = 4  # places looked at along each side of a cell
@@ -50,15 +51,23 @@ def bev_semantics(view: WorldView, grid: GridConfig) -> NDArray[np.uint8]:
         x, y, height, yaw = signals.stop_pose[row]
         if abs(height - z) < LEVEL_M:
             half, back = 0.5 * signals.stop_width_m[row], 0.5 * STOP_DEPTH_M
-            middle = x - back * math.cos(yaw), y - back * math.sin(yaw)
-            _box(*middle, yaw, back, half, pose, sides, _STOP, out)
+            x, y = x - back * math.cos(yaw), y - back * math.sin(yaw)
+            line = Rectangle(float(x), float(y), float(yaw), back, float(half))
+            _box(line, pose, sides, _STOP, out)
     _actors(state, pose, sides, out)
     return out
 
 
 @kernel
-def _ground(raster, pose, sides, out):
-    """Road where most of a cell is, a line where two samples or more meet one."""
+def _ground(raster: Raster, pose: Float64, sides: Float64, out: UInt8) -> None:
+    """Road where most of a cell is, a line where two samples or more meet one.
+
+    Args:
+        raster: Of the level that the ego is on.
+        pose: (4,) x, y, z, yaw of the ego.
+        sides: (4,) least x and y of the grid in the ego's frame, and a cell's sides, [m].
+        out: (X, Y) `BevClass`, written.
+    """
     c, s = math.cos(pose[3]), math.sin(pose[3])
     width, height = raster.width[0], raster.height[0]
     for i in range(out.shape[0]):
@@ -83,24 +92,32 @@ def _ground(raster, pose, sides, out):
 
 
 @kernel
-def _actors(state, pose, sides, out):
+def _actors(state: State, pose: Float64, sides: Float64, out: UInt8) -> None:
+    """Marks everybody but the ego; arguments as for `_ground`."""
     for actor in range(1, state.kind.size):
         kind = state.kind[actor]
         if kind == _ABSENT or kind >= _PROP or abs(state.z[actor] - pose[2]) > LEVEL_M:
             continue
         class_ = _WALKER_CLASS if kind == _WALKER else _VEHICLE
-        _box(state.x[actor], state.y[actor], state.yaw[actor], state.half_length[actor],
-             state.half_width[actor], pose, sides, class_, out)  # fmt: skip
+        box = Rectangle(
+            state.x[actor],
+            state.y[actor],
+            state.yaw[actor],
+            state.half_length[actor],
+            state.half_width[actor],
+        )
+        _box(box, pose, sides, class_, out)
 
 
 @kernel
-def _box(x, y, yaw, half_length, half_width, pose, sides, class_, out):
+def _box(box: Rectangle, pose: Float64, sides: Float64, class_: int, out: UInt8) -> None:
     """Marks the cells whose middles lie in a box, or the one that holds its middle."""
     c, s = math.cos(pose[3]), math.sin(pose[3])
-    dx, dy = x - pose[0], y - pose[1]
+    dx, dy = box.x - pose[0], box.y - pose[1]
     ahead, right = c * dx + s * dy, c * dy - s * dx
-    turn = yaw - pose[3]
+    turn = box.yaw - pose[3]
     c, s = math.cos(turn), math.sin(turn)
+    half_length, half_width = box.half_length, box.half_width
     reach = math.sqrt(half_length * half_length + half_width * half_width)
     own_i = math.floor((ahead - sides[0]) / sides[2])
     own_j = math.floor((right - sides[1]) / sides[3])

@@ -8,38 +8,40 @@ together have the moments asked for.
 from __future__ import annotations
 
 import dataclasses
-import json
-import multiprocessing
-import signal
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from agents import load_agent
 from agents.base import Agent
+from agents.processes import Pool, in_order, processes
 from agents.training.corrections import corrected_drive
 from agents.training.frames import (
     FRAME_S,
-    Drive,
     DriveFileError,
     DriveLog,
+    RecordedDrive,
     read_drive,
+    read_dropped,
     write_drive,
-    write_whole,
+    write_dropped,
 )
 from agents.training.towns import town_files
+from agents.versions import agent_version
+from di_envs.differences import differences
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
 from di_envs.town.plan import RoadOption
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from di_envs.world.world import Event
+from di_envs.world_version import WORLD_VERSION
 
 CARD_FILE = "card.json"
 WEATHER_NOTE = "none: it is drawn from 14 presets whenever a moment is rendered"
@@ -103,25 +105,6 @@ class Outcome:
     fresh: bool = False
 
 
-class Pending(Protocol):
-    """A drive that is on its way, as `concurrent.futures.Future` has it."""
-
-    def result(self) -> Outcome: ...
-    def cancel(self) -> bool: ...
-
-
-class Pool(Protocol):
-    """Whatever drives jobs at the same time: processes here, or a cluster."""
-
-    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending: ...
-
-
-def processes(workers: int) -> AbstractContextManager[Pool]:
-    """So many processes of this machine."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, context, ignore_interrupts)
-
-
 def collect(
     folder: Path,
     towns: Sequence[str],
@@ -130,7 +113,7 @@ def collect(
     driver: str = EXPERT,
     first: int = 0,
     workers: int = 1,
-    pool: AbstractContextManager[Pool] | None = None,
+    pool: AbstractContextManager[Pool[DriveJob, Outcome]] | None = None,
 ) -> Generator[Outcome, None, None]:
     """Drives until each town has its share of the moments; yields each drive as it is there.
 
@@ -146,7 +129,9 @@ def collect(
         pool: Where; None for processes of this machine.
 
     Raises:
-        DriveFileError: If a file there is not whole, or of another driver.
+        DriveFileError: If a file there is not whole, or of another driver, other weights or another
+            version of the world.
+        ChildProcessError: If a process died.
     """
     share = share_of(frames, towns)
     with pool or processes(workers) as drivers:
@@ -163,7 +148,7 @@ def share_of(frames: int, towns: Sequence[str]) -> int:
     return -(-frames // len(towns))
 
 
-def warm_up(town: str) -> None:
+def compile_for_drives(town: str) -> None:
     """Makes a town, and has all kernels compiled that a drive needs."""
     env = _environment(town, EXPERT)
     observation, _ = env.reset(seed=0)
@@ -172,28 +157,21 @@ def warm_up(town: str) -> None:
     env.step(control)
 
 
-def ignore_interrupts() -> None:
-    """For worker processes: Ctrl-C is for the one that they work for."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def _collect_town(
-    pool: Pool, jobs: Iterator[DriveJob], share: int, workers: int
+    pool: Pool[DriveJob, Outcome], jobs: Iterator[DriveJob], share: int, workers: int
 ) -> Iterator[Outcome]:
-    """Drives in order of their numbers, a few ahead, until the first have enough moments."""
-    ahead = [pool.submit(drive_job, next(jobs)) for _ in range(workers)]
+    """Drives in order of their numbers, a few ahead, until the first have enough moments.
+
+    What was driven beyond them is removed: with fewer processes it would not be there.
+    """
     kept = 0
-    try:
-        while kept < share:
-            outcome = ahead.pop(0).result()
+    drives = in_order(pool, drive_job, jobs, ahead=workers, in_vain=_remove)
+    with closing(drives):
+        for outcome in drives:
             kept += outcome.moments
             yield outcome
-            if kept < share:
-                ahead.append(pool.submit(drive_job, next(jobs)))
-    finally:
-        running = [future for future in ahead if not future.cancel()]
-    for future in running:  # driven in vain: with fewer processes it would not be there
-        _remove(future.result())
+            if kept >= share:
+                return
 
 
 def _remove(outcome: Outcome) -> None:
@@ -205,22 +183,38 @@ def _remove(outcome: Outcome) -> None:
 def drive_job(job: DriveJob) -> Outcome:
     """Drives, unless that was done before, and writes the drive or why it is dropped."""
     if job.dropped_path.exists():
-        return Outcome(job=job, moments=0, why=json.loads(job.dropped_path.read_text())["why"])
+        dropped = read_dropped(job.dropped_path)
+        _check_same(job.dropped_path, dropped, job)
+        return Outcome(job=job, moments=0, why=dropped["why"])
     if job.path.exists():
         drive = read_drive(job.path)
-        if drive.facts.get("driver", EXPERT) != job.driver:
-            raise DriveFileError(
-                f"{job.path} was driven by {drive.facts.get('driver', EXPERT)}, not by "
-                f"{job.driver}: name another --output"
-            )
+        _check_same(job.path, drive.facts, job)
         return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
-        text = json.dumps({"why": why}) + "\n"
-        write_whole(job.dropped_path, lambda file: file.write(text.encode()))
+        write_dropped(job.dropped_path, why, _driven_by(job.driver))
         return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
     return Outcome(job=job, moments=len(drive), fresh=True)
+
+
+@lru_cache(2)
+def _driven_by(driver: str) -> Mapping[str, Any]:
+    """Who drives, and in which world: what all drives of a folder have in common."""
+    return {
+        "driver": driver,
+        "agent_version": agent_version(driver),
+        "world_version": WORLD_VERSION,
+    }
+
+
+def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:
+    """Refuses to go on where others have driven, or in another world."""
+    ours = _driven_by(job.driver)
+    theirs = {name: facts.get(name) for name in ours}
+    if found := differences(theirs, ours):
+        said = "; ".join(difference.was_is for difference in found)
+        raise DriveFileError(f"{path} is none of these drives ({said}): name another --output")
 
 
 @lru_cache(2)
@@ -238,7 +232,7 @@ def _driver(driver: str) -> Agent[Any]:
     return load_agent(driver)
 
 
-def _drive(job: DriveJob) -> tuple[Drive, str]:
+def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
     """A drive, and why it is not worth keeping; empty if it is."""
     env = _environment(job.town, job.driver)
     seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
@@ -256,12 +250,12 @@ def _drive(job: DriveJob) -> tuple[Drive, str]:
         "seed": seed,
         "finished": finished,
         "scenarios": _scenarios(events),
-        "driver": job.driver,
+        **_driven_by(job.driver),
     }
     drive = dataclasses.replace(log.drive(facts), shown=shown)
     if finished == "timeout" and shown is None:
         drive = without_standing_tail(drive)
-    faults = [event.kind.name.lower() for event in events if event.kind in FAULTS]
+    faults = [EVENT_KEYS[event.kind] for event in events if event.kind in FAULTS]
     if faults and shown is None:
         return drive, f"infractions: {', '.join(faults)}"
     if len(drive) < LEAST_MOMENTS:
@@ -287,7 +281,7 @@ def _driven(
     return log, events, ended
 
 
-def without_standing_tail(drive: Drive) -> Drive:
+def without_standing_tail(drive: RecordedDrive) -> RecordedDrive:
     """The drive up to where it stood for good: a route that timed out ends in waiting."""
     moving = np.flatnonzero(drive.speeds() > STANDING_MPS)
     return drive.cut(int(moving[-1]) + 1 if len(moving) else 0)
@@ -319,7 +313,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
         drivers[drive.facts.get("driver", EXPERT)] += len(drive)
     dropped = Counter[str]()
     for path in sorted(folder.glob("*/*.dropped.json")):
-        dropped[json.loads(path.read_text())["why"]] += 1
+        dropped[read_dropped(path)["why"]] += 1
     return {
         "moments": sum(towns.values()),
         "seconds_apart": FRAME_S,
@@ -333,7 +327,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
     }
 
 
-def _commands(drive: Drive) -> Counter[str]:
+def _commands(drive: RecordedDrive) -> Counter[str]:
     """How many moments were driven under each command."""
     env = _environment(str(drive.facts["town"]), EXPERT)
     plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import io
 import json
-import multiprocessing
 import tarfile
 from collections.abc import Generator, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,21 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from agents.training.collect import drive_paths, ignore_interrupts
+from agents.processes import in_order, processes
+from agents.training.collect import drive_paths
 from agents.training.frames import (
     FRAME_S,
-    Drive,
     DriveFileError,
     DriveStage,
+    RecordedDrive,
     read_drive,
-    write_whole,
 )
 from agents.training.towns import load_training_town
 from agents.training.variation import FOURTEEN_WEATHERS
 from agents.training.waypoints import expert_waypoints
 from di_envs.config import check_name
+from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, uniform
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.prompt import COMPONENTS
 from di_envs.sensors.camera.config import rig_of
 from di_envs.sensors.lidar.config import lidar_of
@@ -112,19 +111,13 @@ def export(jobs: list[ShardJob], *, workers: int = 1) -> Generator[int, None, No
 
     Raises:
         DriveFileError: If a drive is not whole.
+        ChildProcessError: If a process died.
     """
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, ignore_interrupts) as pool:
-        futures = [pool.submit(write_shard, job) for job in jobs]
-        try:
-            for future in futures:
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+    with processes(workers) as pool:
+        yield from in_order(pool, write_shard, jobs, ahead=2 * workers)
 
 
-def warm_up(job: ShardJob) -> None:
+def compile_for_shards(job: ShardJob) -> None:
     """Renders one sample, so that all kernels are compiled."""
     next(_samples(read_drive(job.drives[0]), job.config))
 
@@ -137,7 +130,7 @@ def write_shard(job: ShardJob) -> int:
     return sum(len(drive) for drive in drives)
 
 
-def _write(file: Any, drives: list[Drive], config: ExportConfig) -> None:
+def _write(file: Any, drives: list[RecordedDrive], config: ExportConfig) -> None:
     with tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar:
         for drive in drives:
             for key, parts in _samples(drive, config):
@@ -147,7 +140,7 @@ def _write(file: Any, drives: list[Drive], config: ExportConfig) -> None:
                     tar.addfile(entry, io.BytesIO(content))
 
 
-def _samples(drive: Drive, config: ExportConfig) -> Iterator[tuple[str, dict[str, bytes]]]:
+def _samples(drive: RecordedDrive, config: ExportConfig) -> Iterator[tuple[str, dict[str, bytes]]]:
     """Key and files of each moment."""
     facts = drive.facts
     town, route = str(facts["town"]), str(facts["route_id"])

@@ -10,17 +10,17 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
-import os
-import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.json_values import JsonError, from_json, one_line, parsed, read_json
+from di_envs.files.whole import write_whole
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.state import ActorKind, Capacity, State, state_dtype, views_of
@@ -42,7 +42,7 @@ class DriveFileError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class RecordedDrive:
     """One route driven once.
 
     Attributes:
@@ -78,7 +78,7 @@ class Drive:
         """(F,) forward speed of the ego [m/s]."""
         return self.actors["speed"][self.first[:-1]]
 
-    def cut(self, moments: int) -> Drive:
+    def cut(self, moments: int) -> RecordedDrive:
         """The first moments alone."""
         rows = int(self.first[moments])
         return dataclasses.replace(
@@ -136,9 +136,9 @@ class DriveLog:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def drive(self, facts: dict[str, Any]) -> Drive:
+    def drive(self, facts: dict[str, Any]) -> RecordedDrive:
         """The drive so far."""
-        return Drive(
+        return RecordedDrive(
             facts=facts,
             capacity=self.view.capacity,
             whole={name: np.stack(values) for name, values in self.whole.items()},
@@ -162,7 +162,7 @@ class DriveStage:
         self.view = WorldView(town=town, state=self._state, plans=(plan,), capacity=capacity)
 
     def set(
-        self, drive: Drive, moment: int, *, right_m: float = 0.0, turn_rad: float = 0.0
+        self, drive: RecordedDrive, moment: int, *, right_m: float = 0.0, turn_rad: float = 0.0
     ) -> None:
         """Shows a moment, with the ego set aside.
 
@@ -186,7 +186,7 @@ class DriveStage:
         state.yaw[0] = yaw + turn_rad
 
 
-def write_drive(path: Path, drive: Drive) -> None:
+def write_drive(path: Path, drive: RecordedDrive) -> None:
     """Writes a drive; the file is there whole or not at all."""
     content: dict[str, Any] = {
         "format": np.array(FORMAT),
@@ -203,22 +203,27 @@ def write_drive(path: Path, drive: Drive) -> None:
     write_whole(path, lambda file: np.savez_compressed(file, **content))
 
 
-def write_whole(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
-    """Writes a file, which is there whole or not at all; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as f:
-        try:
-            write(f)
-            f.flush()
-            os.fsync(f.fileno())
-            os.chmod(f.name, 0o644)
-            os.replace(f.name, path)
-        except BaseException:
-            os.unlink(f.name)
-            raise
+def write_dropped(path: Path, why: str, driven_by: Mapping[str, Any]) -> None:
+    """Writes why a drive is left out, and by whom it was driven, in place of it."""
+    write_whole(path, one_line({"why": why, **driven_by}))
 
 
-def read_drive(path: Path) -> Drive:
+def read_dropped(path: Path) -> Mapping[str, Any]:
+    """Why a drive was left out (`why`), and by whom it was driven.
+
+    Raises:
+        DriveFileError: If the file is missing, or does not say so.
+    """
+    try:
+        facts = from_json(dict[str, Any], read_json(path), str(path))
+        return {**facts, "why": str(facts["why"])}
+    except (JsonError, KeyError) as error:
+        raise DriveFileError(
+            f"{path} does not say why ({error}): delete it and run collect again"
+        ) from error
+
+
+def read_drive(path: Path) -> RecordedDrive:
     """Reads a drive.
 
     Raises:
@@ -232,8 +237,8 @@ def read_drive(path: Path) -> Drive:
             raise DriveFileError(
                 f"{path} is of format {version}, this program reads {FORMAT}: collect it again"
             )
-        return Drive(
-            facts=json.loads(str(content["facts"])),
+        return RecordedDrive(
+            facts=from_json(dict[str, Any], parsed(str(content["facts"]), "facts"), "facts"),
             capacity=Capacity(*content["capacity"].tolist()),
             whole=_part("whole.", content),
             actors=_part("actors.", content),
@@ -244,7 +249,7 @@ def read_drive(path: Path) -> Drive:
         )
     except DriveFileError:
         raise
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise DriveFileError(
             f"{path} is missing or not whole ({error!r}): delete it and run collect again"
         ) from error

@@ -7,10 +7,9 @@ step), so a run that was killed goes on from its checkpoint as if nothing had be
 from __future__ import annotations
 
 import math
-import os
 import pickle
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,8 @@ from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
 from agents.training.samples import Batch, hidden_components
+from di_envs.differences import differences
+from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 
 _PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
@@ -60,18 +61,14 @@ class Training:
         """
         if not self.team.first:
             return
-        part = path.with_suffix(".part")
-        torch.save(
-            {
-                "policy_config": self.policy.config.to_mapping(),
-                "config": self.config.to_mapping(),
-                "policy": self.policy.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
-                "step": self.step,
-            },
-            part,
-        )
-        os.replace(part, path)
+        content = {
+            "policy_config": self.policy.config.to_mapping(),
+            "config": self.config.to_mapping(),
+            "policy": self.policy.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "step": self.step,
+        }
+        write_whole(path, lambda file: torch.save(content, file))
 
     def load(self, path: Path) -> None:
         """Goes on from a checkpoint.
@@ -89,13 +86,14 @@ class Training:
                 f"{path} is not whole ({error!r}): delete it to begin again"
             ) from error
         different = [
-            *_differences(policy, self.policy.config.to_mapping()),
+            *differences(policy, self.policy.config.to_mapping()),
             # what a field did that is newer than the checkpoint is what its default does
-            *_differences({**TrainConfig().to_mapping(), **config}, self.config.to_mapping()),
+            *differences({**TrainConfig().to_mapping(), **config}, self.config.to_mapping()),
         ]
         if different:
+            said = "; ".join(difference.was_is for difference in different)
             raise TrainingError(
-                f"{path} is of another training ({', '.join(different)}): give the same options "
+                f"{path} is of another training ({said}): give the same options "
                 f"to go on with it, or another --output to begin a new one"
             )
         self.policy.load_state_dict(content["policy"])
@@ -179,12 +177,3 @@ def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:
         (planning if name.startswith(_PLANNING) else seeing).append(parameter)
     groups = ((seeing, 1.0), (planning, config.planner_rate))
     return [{"params": params, "rate": rate} for params, rate in groups if params]
-
-
-def _differences(saved: Mapping[str, Any], ours: Mapping[str, Any]) -> list[str]:
-    """What was otherwise when a checkpoint was written, in words."""
-    return [
-        f"{name} was {saved.get(name, 'not there')}, is {value}"
-        for name, value in ours.items()
-        if saved.get(name, None) != value
-    ]

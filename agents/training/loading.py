@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
-import signal
 import zlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,10 +21,11 @@ from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
 from agents.driveinsight.config import PolicyConfig
+from agents.processes import live_for_parent
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
-from agents.training.frames import FRAME_S, Drive, DriveFileError, read_drive
+from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import load_training_town
 from agents.training.variation import Variation
@@ -131,7 +131,7 @@ def load_moments(folders: Sequence[Path], standing_share: float) -> Moments:
     )
 
 
-def _moments_of(drive: Drive, standing_share: float) -> Iterator[int]:
+def _moments_of(drive: RecordedDrive, standing_share: float) -> Iterator[int]:
     """Those with a next one; of those in which the ego stands and stays, only a share."""
     speeds, number = drive.speeds(), int(drive.facts["number"])
     places = drive.poses()[:, :2]
@@ -159,7 +159,7 @@ class Samples(Dataset[Sample]):
         taught, kept_out = moments.held_out(training.held_out)
         self._chosen = taught.some(training.overfit) if training.overfit else taught
         self._measured = kept_out.some(training.measured)
-        self._drives: dict[int, Drive] = {}
+        self._drives: dict[int, RecordedDrive] = {}
         self._renderers: dict[str, Renderer] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -193,12 +193,12 @@ class Samples(Dataset[Sample]):
         step = number // training.batch
         return int(keyed_hash(training.seed, int(Stream.AGENT), step, 4)) % (frames + 1)
 
-    def _drive(self, number: int) -> Drive:
+    def _drive(self, number: int) -> RecordedDrive:
         if number not in self._drives:
             self._drives[number] = read_drive(self._moments.paths[number])
         return self._drives[number]
 
-    def _renderer(self, drive: Drive) -> Renderer:
+    def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
             loaded, plans = load_training_town(town)
@@ -265,10 +265,10 @@ def batches(
 
 
 def _begin_worker(_: int) -> None:
-    """Ctrl-C is for the process that trains: it stops its workers when it has saved.
+    """Lets the process that trains stop its workers, when it has saved.
 
     A worker leaves without tidying its interpreter up: torch may still be sending a batch that
     nobody waits for any more, and a thread that is ended in there aborts the process.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    live_for_parent()
     atexit.register(os._exit, 0)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from pathlib import Path
+
+from di_envs.files.whole import write_whole
 
 HELD_OUT = "held_out"  # column: the waypoint loss [m] on drives kept out of training
 
@@ -41,8 +44,9 @@ def forget_rows_after(path: Path, step: int) -> None:
     at = names.index("step")
     kept = [row for row in rows if float(row[at]) <= step]
     if len(kept) < len(rows):
-        with path.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([names, *kept])
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows([names, *kept])
+        write_whole(path, text.getvalue())
 
 
 def _text(value: float | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -64,77 +64,130 @@ def train(
     Raises:
         TrainingError: If the loss is not finite.
     """
-    team, config = training.team, training.config
-    if team.first:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in (LOG_FILE, CHECKS_FILE):
-            forget_rows_after(folder / name, training.step)
-    keep = _keeper(training, folder, about_data or {})
-    saved_s, sums, count, last = time.monotonic(), dict[str, float](), 0, config.steps
-    while True:
-        left = False
-        if checks and team.first and _due(training, checks, folder):
-            training.save(folder / CHECKPOINT_FILE)
-            left = not _check(training, checks, folder, keep)
-        if team.any(left):
-            return False
-        if training.step == last or team.any(stop()):
+    loop = _Loop(
+        training=training, data=data, folder=folder, checks=checks, about_data=about_data or {}
+    )
+    loop.begin()
+    while loop.checked():
+        if loop.last_is_done or training.team.any(stop()):
+            loop.end()
             break
-        terms = training.update(next(data))
+        terms = loop.step()
         on_step(training.step, terms)
+        loop.log()
+    return loop.last_is_done and not loop.left
+
+
+@dataclass(kw_only=True)
+class _Loop:
+    """The steps of a training, and what is written between them.
+
+    Attributes:
+        left: Whether a check was left, as it was asked to stop.
+        sums: By loss term, over the steps since the last row of the log.
+        count: Of these steps.
+        saved_s: When the last checkpoint was written.
+    """
+
+    training: Training
+    data: Iterator[Batch]
+    folder: Path
+    checks: Checks | None
+    about_data: Mapping[str, Any]
+    left: bool = False
+    sums: dict[str, float] = field(default_factory=dict)
+    count: int = 0
+    saved_s: float = field(default_factory=time.monotonic)
+
+    @property
+    def last_is_done(self) -> bool:
+        return self.training.step == self.training.config.steps
+
+    def begin(self) -> None:
+        """Makes the folder; what was logged after the checkpoint comes again."""
+        if self.training.team.first:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            for name in (LOG_FILE, CHECKS_FILE):
+                forget_rows_after(self.folder / name, self.training.step)
+
+    def checked(self) -> bool:
+        """Drives with the policy if that is due; False if any of the team left its check."""
+        if self.training.team.first and self._check_is_due():
+            self.save()
+            self.left = not self._check()
+        self.left = self.training.team.any(self.left)
+        return not self.left
+
+    def step(self) -> dict[str, float]:
+        """Learns from the next batch; returns the terms of its loss."""
+        terms = self.training.update(next(self.data))
         for name, value in terms.items():
-            sums[name] = sums.get(name, 0.0) + value
-        count += 1
-        if training.step % LOG_EVERY == 0 or training.step == last:
-            row: dict[str, float | None] = {name: value / count for name, value in sums.items()}
-            if config.held_out:
-                due = config.measured_after(training.step)
-                row[HELD_OUT] = training.measure(data) if due else None
-            if team.first:
-                append_row(folder / LOG_FILE, {"step": training.step, **row})
-            sums, count = {}, 0
-            # together with a row, so that rows are the same however often a run is cut off
-            if time.monotonic() - saved_s > CHECKPOINT_EVERY_S:
-                training.save(folder / CHECKPOINT_FILE)
-                saved_s = time.monotonic()
-    training.save(folder / CHECKPOINT_FILE)
-    if training.step == last and not checks and team.first:
-        keep()
-    return training.step == last
+            self.sums[name] = self.sums.get(name, 0.0) + value
+        self.count += 1
+        return terms
 
+    def log(self) -> None:
+        """Writes a row after some steps and the last, and a checkpoint after some minutes.
 
-def _keeper(training: Training, folder: Path, about_data: Mapping[str, Any]) -> Callable[[], None]:
-    """Writes the present policy with its card."""
+        Checkpoints come together with a row, so that rows are the same however often a run is cut.
+        """
+        if self.training.step % LOG_EVERY and not self.last_is_done:
+            return
+        row = self._row()
+        if self.training.team.first:
+            append_row(self.folder / LOG_FILE, row)
+        if time.monotonic() - self.saved_s > CHECKPOINT_EVERY_S:
+            self.save()
+            self.saved_s = time.monotonic()
 
-    def keep() -> None:
+    def _row(self) -> dict[str, float | None]:
+        """Means since the last row; how it does on drives kept out, where that is due."""
+        row: dict[str, float | None] = {"step": self.training.step}
+        row |= {name: value / self.count for name, value in self.sums.items()}
+        self.sums, self.count = {}, 0
+        config = self.training.config
+        if config.held_out:
+            due = config.measured_after(self.training.step)
+            row[HELD_OUT] = self.training.measure(self.data) if due else None
+        return row
+
+    def save(self) -> None:
+        """Writes a checkpoint."""
+        self.training.save(self.folder / CHECKPOINT_FILE)
+
+    def end(self) -> None:
+        """Writes the last checkpoint; and the policy, unless checks have chosen one."""
+        self.save()
+        if self.last_is_done and not self.checks and self.training.team.first:
+            self._keep()
+
+    def _check_is_due(self) -> bool:
+        """Whether a check belongs here that was not made before."""
+        step = self.training.step
+        if not self.checks or step == 0 or (step % self.checks.every and not self.last_is_done):
+            return False
+        return all(row["step"] != step for row in read_rows(self.folder / CHECKS_FILE))
+
+    def _check(self) -> bool:
+        """Drives with the present policy, and keeps it if none before drove better."""
+        assert self.checks is not None
+        before = [row["driving_score"] for row in read_rows(self.folder / CHECKS_FILE)]
+        found = self.checks.score(self.training.policy)
+        if found is None:
+            return False
+        append_row(self.folder / CHECKS_FILE, {"step": self.training.step, **found})
+        if found["driving_score"] >= max(before, default=0.0):
+            self._keep()
+        return True
+
+    def _keep(self) -> None:
+        """Writes the present policy with its card."""
         card = model_card(
-            training.policy,
-            training.config,
-            step=training.step,
-            log=read_rows(folder / LOG_FILE),
-            checks=read_rows(folder / CHECKS_FILE),
-            about_data=about_data,
+            self.training.policy,
+            self.training.config,
+            step=self.training.step,
+            log=read_rows(self.folder / LOG_FILE),
+            checks=read_rows(self.folder / CHECKS_FILE),
+            about_data=self.about_data,
         )
-        save_pretrained(training.policy, folder / POLICY_FOLDER, card)
-
-    return keep
-
-
-def _due(training: Training, checks: Checks, folder: Path) -> bool:
-    """Whether a check belongs here that was not made before."""
-    step = training.step
-    if step == 0 or (step % checks.every and step != training.config.steps):
-        return False
-    return all(row["step"] != step for row in read_rows(folder / CHECKS_FILE))
-
-
-def _check(training: Training, checks: Checks, folder: Path, keep: Callable[[], None]) -> bool:
-    """Drives with the present policy, and keeps it if none before drove better."""
-    before = [row["driving_score"] for row in read_rows(folder / CHECKS_FILE)]
-    found = checks.score(training.policy)
-    if found is None:
-        return False
-    append_row(folder / CHECKS_FILE, {"step": training.step, **found})
-    if found["driving_score"] >= max(before, default=0.0):
-        keep()
-    return True
+        save_pretrained(self.training.policy, self.folder / POLICY_FOLDER, card)

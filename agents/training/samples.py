@@ -23,11 +23,11 @@ from agents.driveinsight.lift import depths_m
 from agents.driveinsight.losses import Targets
 from agents.driveinsight.model import Inputs
 from agents.training.bev_teacher import bev_semantics
-from agents.training.frames import Drive, DriveStage
+from agents.training.frames import DriveStage, RecordedDrive
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
 from di_envs.numerics.keyed_random import Stream, uniform
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -51,7 +51,7 @@ class Renderer:
         self._stages = functools.lru_cache(64)(self._stage)
 
     def sample(
-        self, drive: Drive, last: int, variation: Variation, key: int, *, past: int
+        self, drive: RecordedDrive, last: int, variation: Variation, key: int, *, past: int
     ) -> Sample:
         """The moments that end at `last`.
 
@@ -86,7 +86,7 @@ class Renderer:
         return stage, observer
 
     def _targets(
-        self, drive: Drive, moment: int, stage: DriveStage, observation: dict[str, Any]
+        self, drive: RecordedDrive, moment: int, stage: DriveStage, observation: dict[str, Any]
     ) -> Targets:
         state = stage.view.state
         pose = np.array([state.x[0], state.y[0], state.yaw[0]])

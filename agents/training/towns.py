@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import random
-import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +20,7 @@ from platformdirs import user_cache_path
 
 from agents.training.street_grids import TownStyle, street_tables
 from di_envs.config import check_name
+from di_envs.files.whole import whole_folder
 from di_envs.town.building.junction_layout import town_text
 from di_envs.town.building.routes import random_way
 from di_envs.town.building.scenarios import build_scenarios
@@ -174,16 +172,8 @@ def town_files(name: str) -> TownFiles:
     folder = user_cache_path("driveinsight") / "training" / f"{name}-{_recipe_hash(name)}"
     files = TownFiles(name=name, folder=folder)
     if not files.scenarios.is_file():
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(dir=folder.parent))
-        try:
+        with whole_folder(folder) as made:
             _make(TownFiles(name=name, folder=made))
-            os.replace(made, folder)
-        except OSError:  # another process was faster: its files are the same
-            if not files.scenarios.is_file():
-                raise
-        finally:
-            shutil.rmtree(made, ignore_errors=True)
     return files
 
 

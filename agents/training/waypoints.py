@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.training.frames import Drive
+from agents.training.frames import RecordedDrive
 
 
 def expert_waypoints(
-    drive: Drive, moment: int, count: int, pose: NDArray[np.float64]
+    drive: RecordedDrive, moment: int, count: int, pose: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Where the expert was afterwards.
 

@@ -29,8 +29,9 @@ from di_envs.drawing.outlines import (
     stop_line_ends,
 )
 from di_envs.drawing.prompt_text import prompt_in_words
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.reward import standing_of
+from di_envs.world.event_names import EVENT_NAMES, event_of_key
 from di_envs.world.kinds import ActorKind, EventKind
 from di_envs.world.world import WorldView
 
@@ -188,12 +189,8 @@ def _glyphs(text: str, size: int) -> Any:
 
 def _events_in_words(counts: list[int], finished: str) -> list[tuple[str, str]]:
     """The infractions so far, and how the route has ended."""
-    words = [
-        (kind.name.lower().replace("_", " "), f"{counts[kind]} x")
-        for kind in _INFRACTIONS
-        if counts[kind]
-    ]
-    return [*words, ("route", finished.replace("_", " "))] if finished else words
+    words = [(EVENT_NAMES[kind], f"{counts[kind]} x") for kind in _INFRACTIONS if counts[kind]]
+    return [*words, ("route", EVENT_NAMES[event_of_key(finished)])] if finished else words
 
 
 class _Pen:

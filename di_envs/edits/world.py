@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, Self
 
 from di_envs.config import WEATHERS, check_name
+from di_envs.edits.conditions import number_text
 from di_envs.edits.text import EditError, EditText, read_edits
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class MoveActor:
             verb="move",
             target="actor",
             value=str(self.actor),
-            settings={name: repr(float(metres)) for name, metres in settings.items() if metres},
+            settings={name: number_text(metres) for name, metres in settings.items() if metres},
         )
 
     @classmethod
@@ -164,6 +165,11 @@ WORLD_EDITS: Mapping[str, Callable[[EditText], WorldEdit]] = {
     "force:light": ForceLight.of,
     "change:weather": ChangeWeather.of,
 }
+
+
+def is_world_edit(text: EditText) -> bool:
+    """Whether an edit is of the world, not of what somebody sees of it."""
+    return f"{text.verb}:{text.target}" in WORLD_EDITS
 
 
 def read_world_edits(text: str) -> tuple[WorldEdit, ...]:

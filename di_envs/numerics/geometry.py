@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Angles, frames and boxes, as scalar kernels.
 
 World frame: x east, y south, z up, yaw clockwise from x towards y. Ego frame: x ahead, y right.
@@ -12,13 +11,15 @@ from di_envs.numerics.kernels import kernel
 
 
 @kernel
-def wrap_angle(angle_rad):
+def wrap_angle(angle_rad: float) -> float:
     """The same angle in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @kernel
-def to_local(x, y, origin_x, origin_y, origin_yaw):
+def to_local(
+    x: float, y: float, origin_x: float, origin_y: float, origin_yaw: float
+) -> tuple[float, float]:
     """A world point in the frame of a pose: (ahead, right) [m]."""
     dx, dy = x - origin_x, y - origin_y
     c, s = math.cos(origin_yaw), math.sin(origin_yaw)
@@ -27,9 +28,21 @@ def to_local(x, y, origin_x, origin_y, origin_yaw):
 
 @kernel
 def boxes_overlap(
-    ax, ay, a_yaw, a_half_length, a_half_width, bx, by, b_yaw, b_half_length, b_half_width
-):
-    """Whether two oriented rectangles overlap (separating axes); touching does not count."""
+    ax: float,
+    ay: float,
+    a_yaw: float,
+    a_half_length: float,
+    a_half_width: float,
+    bx: float,
+    by: float,
+    b_yaw: float,
+    b_half_length: float,
+    b_half_width: float,
+) -> bool:
+    """Whether two oriented rectangles overlap (separating axes); touching does not count.
+
+    Middles and half sides [m], and yaws [rad], are in one frame.
+    """
     dx, dy = bx - ax, by - ay
     reach = a_half_length + a_half_width + b_half_length + b_half_width
     if dx * dx + dy * dy > reach * reach:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Keyed randomness: each draw is a hash of what it is for, so no draw depends on another.
 
 Removing an actor, adding a sensor or skipping a draw then changes nobody else's numbers.
@@ -10,10 +9,14 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from di_envs.numerics.kernels import kernel
+
+Bits = np.uint64
+Key = Any  # a whole number of any width, taken modulo 2**64
 
 
 class Stream(IntEnum):
@@ -42,7 +45,7 @@ class Stream(IntEnum):
 
 
 @kernel
-def mix(value):
+def mix(value: Key) -> Bits:
     """Scrambles 64 bits."""
     value = np.uint64(value) + np.uint64(0x9E3779B97F4A7C15)
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -51,7 +54,7 @@ def mix(value):
 
 
 @kernel
-def keyed_part(seed, stream, tick):
+def keyed_part(seed: Key, stream: Key, tick: Key) -> Bits:
     """What many draws share: `keyed_hash(seed, stream, tick, actor)` is `mix(part ^ actor)`."""
     value = mix(np.uint64(seed))
     value = mix(value ^ np.uint64(stream))
@@ -59,13 +62,13 @@ def keyed_part(seed, stream, tick):
 
 
 @kernel
-def keyed_hash(seed, stream, tick, actor):
+def keyed_hash(seed: Key, stream: Key, tick: Key, actor: Key) -> Bits:
     """Hashes four integers to 64 bits."""
     return mix(keyed_part(seed, stream, tick) ^ np.uint64(actor))
 
 
 @kernel
-def uniform(seed, stream, tick, actor):
+def uniform(seed: Key, stream: Key, tick: Key, actor: Key) -> float:
     """A number in [0, 1), a function of its four integer keys alone."""
     return float(keyed_hash(seed, stream, tick, actor) >> np.uint64(11)) * (
         1.0 / 9007199254740992.0
@@ -73,7 +76,7 @@ def uniform(seed, stream, tick, actor):
 
 
 @kernel
-def normal(seed, stream, tick, actor):
+def normal(seed: Key, stream: Key, tick: Key, actor: Key) -> float:
     """A standard normal number (Box-Muller), a function of its four integer keys alone."""
     radius = math.sqrt(-2.0 * math.log(1.0 - uniform(seed, stream, tick, actor)))
     return radius * math.cos(2.0 * math.pi * uniform(seed, stream + 1000, tick, actor))

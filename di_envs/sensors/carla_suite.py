@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
+from di_envs.files.names import name_hint
 from di_envs.sensors.camera.config import CameraConfig, Rig
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 
@@ -191,10 +192,8 @@ def _sensor(given: Any, number: int) -> CarlaSensor:
     if not isinstance(id_, str) or not id_:
         raise SensorSuiteError(f"Sensor {number} ({type_}) needs an 'id', a string; got {id_!r}.")
     if str(type_) not in list(SensorType):
-        near = difflib.get_close_matches(str(type_), _NUMBERS, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
         raise SensorSuiteError(
-            f"Sensor '{id_}': unknown type {type_!r}; {hint}known: {', '.join(_NUMBERS)}."
+            f"Sensor '{id_}': unknown type {type_!r}; {name_hint(type_, _NUMBERS)}."
         )
     if type_ == SensorType.RADAR:
         raise SensorSuiteError(

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """IMU and GNSS as CARLA's Leaderboard mounts them, with its noise, as functions of the state.
 
 Source: noise as set by the Leaderboard's agent wrapper; compass and axes as in CARLA's IMU sensor
@@ -11,10 +10,13 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float32, Float64
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, normal
+from di_envs.town.lanes import Lanes
 from di_envs.town.queries import pose_at
+from di_envs.world.state import State
 
 GRAVITY_MPS2 = 9.81
 ACCELERATION_NOISE_MPS2 = (0.001, 0.001, 0.015)
@@ -29,7 +31,7 @@ _AXLE_M = 1.4  # from the ego's centre to its axles, between which the road's sl
 
 
 @kernel
-def slope_below(state, lanes, ego):
+def slope_below(state: State, lanes: Lanes, ego: int) -> tuple[float, float]:
     """Rise of the road below an ego, ahead and to the right, in metres a metre; 0 off the lanes.
 
     A lane rises along itself and is level across.
@@ -47,15 +49,15 @@ def slope_below(state, lanes, ego):
 
 
 @kernel
-def fill_imu(state, lanes, ego, out):
+def fill_imu(state: State, lanes: Lanes, ego: int, out: Float32) -> None:
     """Writes accelerations [m/s2], angular rates [rad/s] and the compass [rad], CARLA's order.
 
     As an accelerometer does, it shows gravity: at rest on a level road 9.81 upwards, on a slope a
     part of it along the road. The rates are those of a level road: pitching is left out.
 
     Args:
-        state: `State` of the world.
-        lanes: `Lanes` of the town.
+        state: Of the world.
+        lanes: Of the town.
         ego: The ego's index.
         out: (7,) ax, ay, az, gx, gy, gz, compass in [0, 2 pi).
     """
@@ -75,7 +77,9 @@ def fill_imu(state, lanes, ego, out):
 
 
 @kernel
-def geodetic(x, y, origin_latitude, origin_longitude):
+def geodetic(
+    x: float, y: float, origin_latitude: float, origin_longitude: float
+) -> tuple[float, float]:
     """Latitude and longitude [deg] of a world point [m], by Mercator; north is -y."""
     scale = math.cos(math.radians(origin_latitude))
     east = scale * EARTH_RADIUS_M * math.radians(origin_longitude) + x
@@ -87,11 +91,13 @@ def geodetic(x, y, origin_latitude, origin_longitude):
 
 
 @kernel
-def fill_gnss(state, ego, origin_latitude, origin_longitude, out):
+def fill_gnss(
+    state: State, ego: int, origin_latitude: float, origin_longitude: float, out: Float64
+) -> None:
     """Writes latitude [deg], longitude [deg] and altitude [m].
 
     Args:
-        state: `State` of the world.
+        state: Of the world.
         ego: The ego's index.
         origin_latitude: Of the map's origin [deg].
         origin_longitude: Of the map's origin [deg].

@@ -7,7 +7,6 @@ stands in the south-west here. How they look is our own approximation.
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.names import check_name
 from di_envs.numerics.bundles import by_reference
 
 SUN_AZIMUTH_RAD = math.radians(125.0)  # in the world frame: where the sun stands
@@ -90,9 +90,13 @@ class Look(NamedTuple):
     ambient: NDArray[np.float32]  # (3,) light from everywhere
     zenith: NDArray[np.float32]  # (3,) sky above
     horizon: NDArray[np.float32]  # (3,) sky at the horizon, and of what haze hides
-    # (8,): haze [1/m], shadow's share of the sun taken away, wetness, puddles, rain (all 0..1),
-    # night (0 or 1), clouds (0..1), window glow
-    numbers: NDArray[np.float32]
+    haze: float  # 1/m
+    shadow: float  # 0..1: share of the sun that a shadow takes away
+    wetness: float  # 0..1, of roads
+    puddles: float  # 0..1
+    rain: float  # 0..1
+    window_glow: float  # 0..1
+    night: int  # 1 when headlights shine
 
 
 def weather_of(weather: str | Weather) -> Weather:
@@ -103,10 +107,7 @@ def weather_of(weather: str | Weather) -> Weather:
     """
     if isinstance(weather, Weather):
         return weather
-    if weather not in PRESETS:
-        near = difflib.get_close_matches(str(weather), PRESETS, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"Unknown weather {weather!r}; {hint}known: {', '.join(PRESETS)}.")
+    check_name(weather, PRESETS, "weather")
     return PRESETS[weather]
 
 
@@ -143,24 +144,25 @@ def look_of(weather: Weather) -> Look:
         horizon = np.array([0.055, 0.060, 0.085]) + 0.02 * cloud
     haze = 1.0 / 700.0 + rain / 260.0 + weather.dust / 100.0 / 45.0
     haze += weather.fog / 100.0 / (300.0 if night else 60.0)
-    numbers = (
-        haze,
-        0.0 if night else 0.92 * (1.0 - 0.75 * cloud),
-        max(weather.wetness, weather.precipitation) / 100.0,
-        weather.deposits / 100.0,
-        rain,
-        float(night),
-        cloud,
-        0.6 if night else 0.0,
-    )
     return Look(
         sun=np.array(sun, np.float32),
         sun_colour=(clear_sun * direct).astype(np.float32),
         ambient=shade.astype(np.float32),
         zenith=zenith.astype(np.float32),
         horizon=np.minimum(horizon, 1.0).astype(np.float32),
-        numbers=np.array(numbers, np.float32),
+        haze=_single(haze),
+        shadow=_single(0.0 if night else 0.92 * (1.0 - 0.75 * cloud)),
+        wetness=_single(max(weather.wetness, weather.precipitation) / 100.0),
+        puddles=_single(weather.deposits / 100.0),
+        rain=_single(rain),
+        window_glow=_single(0.6 if night else 0.0),
+        night=int(night),
     )
+
+
+def _single(value: float) -> float:
+    """A number of no more than single precision, as colours are."""
+    return float(np.float32(value))
 
 
 def _mix(a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:

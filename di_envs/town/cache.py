@@ -1,22 +1,25 @@
 """Parsed towns in the user's cache folder, safe when several processes write at once.
 
-A town is one `.npz` file named by the hash of all that it was made from. A file that cannot be read
-is no error: the town is parsed again and the file replaced.
+A town is one `.npz` file named by a hash of all that it was made from: the map, its signals and the
+reader's own source, so that an edited reader never finds what another one left. A file that cannot
+be read is no error: the town is parsed again and the file replaced.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-import os
-import tempfile
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from platformdirs import user_cache_path
 
+from di_envs.files.json_values import from_json, parsed
+from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.town.town import Town
 
@@ -43,6 +46,16 @@ READER_MODULES = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class _About:
+    """What a file holds beside arrays."""
+
+    key: str
+    road_names: tuple[str, ...]
+    junction_names: tuple[str, ...]
+    geo_origin: tuple[float, float]
+
+
 def cache_folder() -> Path:
     """Where parsed towns are kept."""
     return user_cache_path("driveinsight") / "towns"
@@ -58,33 +71,38 @@ def reader_version() -> str:
 
 
 def content_hash(opendrive: bytes, signals: bytes) -> str:
-    """The identity of a town: its OpenDRIVE file, its signals and the reader."""
-    parts = (opendrive, signals, reader_version().encode())
-    digests = b"".join(hashlib.sha256(part).digest() for part in parts)
+    """The identity of a town: its OpenDRIVE file and its signals, whoever reads them."""
+    digests = b"".join(hashlib.sha256(part).digest() for part in (opendrive, signals))
     return hashlib.sha256(digests).hexdigest()[:32]
 
 
-def load_cached(key: str, name: str, opendrive: str, folder: Path) -> Town | None:
-    """The town of a key, or None where there is no readable one."""
+def cache_key(town_hash: str) -> str:
+    """What the file of a town is called: the town, as this reader reads it."""
+    return hashlib.sha256(f"{town_hash} {reader_version()}".encode()).hexdigest()[:32]
+
+
+def load_cached(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | None:
+    """The town of a `content_hash`, or None where there is no readable one."""
+    key = cache_key(town_hash)
     path = folder / f"{key}.npz"
     try:
         # Opened here: np.load would leave a file open that turns out to be no archive.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = json.loads(str(stored["about"]))
+            about = from_json(_About, parsed(str(stored["about"]), str(path)), str(path))
             arrays = {
                 part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
                 for part, kind in _PARTS.items()
             }
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    if about.get("key") != key:
+    if about.key != key:
         return None
     return Town(
         name=name,
-        road_names=tuple(about["road_names"]),
-        junction_names=tuple(about["junction_names"]),
-        geo_origin=(about["geo_origin"][0], about["geo_origin"][1]),
-        content_hash=key,
+        road_names=about.road_names,
+        junction_names=about.junction_names,
+        geo_origin=about.geo_origin,
+        content_hash=town_hash,
         opendrive=opendrive,
         **arrays,
     )
@@ -95,8 +113,9 @@ _PARTS: dict[str, Any] = {"lanes": Lanes, "signals": Signals, "crosswalks": Cros
 
 def store(town: Town, folder: Path) -> None:
     """Writes a town for later; a cache folder that cannot be written is not an error."""
+    key = cache_key(town.content_hash)
     about = {
-        "key": town.content_hash,
+        "key": key,
         "road_names": town.road_names,
         "junction_names": town.junction_names,
         "geo_origin": town.geo_origin,
@@ -106,17 +125,11 @@ def store(town: Town, folder: Path) -> None:
         for part in _PARTS
         for field, value in getattr(town, part)._asdict().items()
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, suffix=".tmp")
-    except OSError:
-        return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, about=np.array(json.dumps(about)), **arrays)
-        os.replace(temporary, folder / f"{town.content_hash}.npz")
-    except OSError:
-        Path(temporary).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        write_whole(
+            folder / f"{key}.npz",
+            lambda file: np.savez(file, about=np.array(json.dumps(about)), **arrays),
+        )
 
 
 def freeze(town: Town) -> Town:

@@ -10,14 +10,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.numerics.bundles import by_reference
-
-Int8 = NDArray[np.int8]
-Int32 = NDArray[np.int32]
-Float64 = NDArray[np.float64]
 
 
 class LaneKind(IntEnum):

@@ -18,5 +18,5 @@ class Town:
     road_names: tuple[str, ...]  # OpenDRIVE road ids, by Lanes.road
     junction_names: tuple[str, ...]  # OpenDRIVE junction ids, by Lanes.junction
     geo_origin: tuple[float, float]  # latitude, longitude [deg] of x = y = 0
-    content_hash: str  # of the OpenDRIVE text, the signals and the reader's version
+    content_hash: str  # of the OpenDRIVE file and the signals
     opendrive: str  # the OpenDRIVE text

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Boxes of actors: how they overlap, and what the event rules read of an ego."""
 
 from __future__ import annotations
@@ -6,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from di_envs.numerics.kernels import kernel
+from di_envs.world.state import State
 
 LARGEST_M = 60.0  # no two bodies touch whose middles are further apart
 SAME_LEVEL_M = 3.0  # bodies further apart in height are on different levels
@@ -28,20 +26,20 @@ class Box(NamedTuple):
 class EgoNow(NamedTuple):
     """What the event rules read of an ego in a tick."""
 
-    ego: np.int64  # its actor index
-    tick: np.int64
+    ego: int  # its actor index
+    tick: int
     x: float
     y: float
     z: float
     yaw: float
     speed: float
     half_length: float
-    lane: np.int64  # nearest driving lane, -1 for none
+    lane: int  # nearest driving lane, -1 for none
     lane_m: float
 
 
 @kernel
-def box_of(state, actor):
+def box_of(state: State, actor: int) -> Box:
     """The box of one actor."""
     return Box(
         state.x[actor],
@@ -54,7 +52,7 @@ def box_of(state, actor):
 
 
 @kernel
-def may_touch(state, a, b):
+def may_touch(state: State, a: int, b: int) -> bool:
     """Whether two actors are so near each other that their boxes might overlap."""
     dx, dy = state.x[b] - state.x[a], state.y[b] - state.y[a]
     if abs(dx) > LARGEST_M or abs(dy) > LARGEST_M:
@@ -65,7 +63,7 @@ def may_touch(state, a, b):
 
 
 @kernel
-def overlap(a, b):
+def overlap(a: Box, b: Box) -> tuple[float, float, float]:
     """How two boxes overlap, seen from above, by separating axes.
 
     Returns:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What happens when an ego's body meets another: nobody passes through, and no energy is made.
 
 A contact is a perfectly inelastic impact of two point masses along the contact normal; each body
@@ -13,11 +12,12 @@ import math
 
 import numpy as np
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.bodies import box_of, may_touch, overlap
 from di_envs.world.events.collisions import count_collision, forget_collisions
 from di_envs.world.events.rows import count_rows
-from di_envs.world.state import ActorKind
+from di_envs.world.state import ActorKind, State
 
 SLOP_M = 1e-3  # left between bodies that were pushed apart
 PASSES = 3  # pushing an ego out of one body may push it into the next
@@ -33,7 +33,9 @@ INVERSE_MASS = np.array(
 
 
 @kernel
-def speeds_after(ego_speed, ego_weight, ego_along, speed, weight, along):
+def speeds_after(
+    ego_speed: float, ego_weight: float, ego_along: float, speed: float, weight: float, along: float
+) -> tuple[float, float]:
     """Speeds of an ego and another body after an inelastic impact; neither falls below zero.
 
     Args:
@@ -56,7 +58,8 @@ def speeds_after(ego_speed, ego_weight, ego_along, speed, weight, along):
 
 
 @kernel
-def _exchange_speed(state, ego, other, nx, ny):
+def _exchange_speed(state: State, ego: int, other: int, nx: float, ny: float) -> None:
+    """Gives two bodies their speeds after an impact along the unit normal (nx, ny), world frame."""
     ego_along = math.cos(state.yaw[ego]) * nx + math.sin(state.yaw[ego]) * ny
     along = math.cos(state.yaw[other]) * nx + math.sin(state.yaw[other]) * ny
     state.speed[ego], state.speed[other] = speeds_after(
@@ -70,7 +73,7 @@ def _exchange_speed(state, ego, other, nx, ny):
 
 
 @kernel
-def _part(state, ego, other, share, dx, dy):
+def _part(state: State, ego: int, other: int, share: float, dx: float, dy: float) -> None:
     """Moves the bodies apart: the ego by `share` of the way, the other by the rest."""
     state.x[ego] -= share * dx
     state.y[ego] -= share * dy
@@ -79,7 +82,7 @@ def _part(state, ego, other, share, dx, dy):
 
 
 @kernel
-def _knock_down(state, ego, walker):
+def _knock_down(state: State, ego: int, walker: int) -> None:
     """The walker takes its share of momentum once, then lies, pushed along without weight."""
     if state.walk_waiting[walker] != DOWN:
         ego_weight = INVERSE_MASS[state.kind[ego]]
@@ -90,7 +93,7 @@ def _knock_down(state, ego, walker):
 
 
 @kernel
-def resolve_contacts(state, out, n):
+def resolve_contacts(state: State, out: Float64, n: int) -> int:
     """Parts every ego from what its box overlaps, and records the collisions.
 
     Call it once a tick, after everybody has moved and before `locate_ego`: it moves egos.
@@ -115,7 +118,7 @@ def resolve_contacts(state, out, n):
 
 
 @kernel
-def _resolve_once(state, out, n):
+def _resolve_once(state: State, out: Float64, n: int) -> tuple[bool, int]:
     """Resolves each overlap of an ego once; returns (whether there was one, rows in use)."""
     touched = False
     egos = state.throttle.size

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How an ego moves under throttle, brake and steering: a bicycle fitted to CARLA's Lincoln."""
 
 from __future__ import annotations
@@ -7,13 +6,14 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
-import numpy as np
-
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.geometry import wrap_angle
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.town.queries import DRIVING_MASK, lanes_below_box, nearest_lane, pose_at
-from di_envs.world.state import HISTORY_LENGTH, TICK_S
+from di_envs.town.lanes import Lanes
+from di_envs.town.lanes_below import lanes_below_box
+from di_envs.town.queries import DRIVING_MASK, nearest_lane, pose_at
+from di_envs.world.state import HISTORY_LENGTH, TICK_S, State
 
 LOOK_M = 40.0  # for a lane; an ego this far from all of them has left its route too
 
@@ -83,7 +83,9 @@ class EgoModel:
 
 
 @kernel
-def longitudinal_acceleration(speed_mps, throttle, brake, model):
+def longitudinal_acceleration(
+    speed_mps: float, throttle: float, brake: float, model: EgoParameters
+) -> float:
     """Acceleration along the heading [m/s²]; throttle and brake both act, and the brake wins."""
     push = throttle * (model.throttle_square_mps2 * throttle + model.throttle_linear_mps2)
     drive = max(push, 0.0) * (1.0 - speed_mps / model.drive_fades_at_mps)
@@ -91,7 +93,7 @@ def longitudinal_acceleration(speed_mps, throttle, brake, model):
 
 
 @kernel
-def pedals(acceleration, speed, model):
+def pedals(acceleration: float, speed: float, model: EgoParameters) -> tuple[float, float]:
     """Throttle and brake that give an acceleration [m/s²] at a speed; standing, the brake holds.
 
     The inverse of `longitudinal_acceleration`, as far as the engine and the brakes go.
@@ -108,7 +110,7 @@ def pedals(acceleration, speed, model):
 
 
 @kernel
-def move_ego(state, ego, model):
+def move_ego(state: State, ego: int, model: EgoParameters) -> None:
     """Advances one ego by a tick under its held controls, plus the noise of a loss of control.
 
     `state.tick` is the tick that the motion ends at: the caller counts up first, so that
@@ -142,13 +144,13 @@ def move_ego(state, ego, model):
 
 
 @kernel
-def locate_ego(state, lanes, ego):
+def locate_ego(state: State, lanes: Lanes, ego: int) -> None:
     """Finds the lanes below an ego, and its height from the nearest one; none beyond 40 m.
 
     Lanes more than 2.5 m above or below it do not count, so a bridge is not the road below.
     """
     x, y, z = state.x[ego], state.y[ego], state.z[ego]
-    lane, station, lateral, _distance = nearest_lane(lanes, x, y, z, LOOK_M, np.int64(DRIVING_MASK))
+    lane, station, lateral, _distance = nearest_lane(lanes, x, y, z, LOOK_M, as_int64(DRIVING_MASK))
     state.lane[ego] = lane
     state.lane_m[ego] = station
     state.lateral_m[ego] = lateral

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Traffic lights: the arms of a junction take turns, one group at a time, the rest stay red.
 
 While a scenario plays with a junction's lights its turns stand still; then they go on.
@@ -13,8 +12,8 @@ import numpy as np
 
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, keyed_hash
-from di_envs.town.lanes import LightState, SignalKind
-from di_envs.world.state import TICK_S
+from di_envs.town.lanes import LightState, SignalKind, Signals
+from di_envs.world.state import TICK_S, State
 
 GREEN_TICKS = round(10.0 / TICK_S)
 YELLOW_TICKS = round(3.0 / TICK_S)
@@ -27,19 +26,19 @@ _PHASE_STREAM = int(Stream.LIGHT_PHASE)
 
 
 @kernel
-def start_lights(state, signals):
+def start_lights(state: State, signals: Signals) -> None:
     """Draws whose turn it is at each junction, and for how long it has been, from the seed."""
     for junction in range(signals.groups.size):
         groups = signals.groups[junction]
         if groups > 0:
-            draw = keyed_hash(state.seed[()], _PHASE_STREAM, 0, junction)
+            draw = keyed_hash(int(state.seed[()]), _PHASE_STREAM, 0, junction)
             state.phase_group[junction] = np.int32(draw % np.uint64(groups))
             state.phase_ticks[junction] = np.int32((draw >> np.uint64(20)) % np.uint64(TURN_TICKS))
     show_lights(state, signals)
 
 
 @kernel
-def advance_lights(state, signals):
+def advance_lights(state: State, signals: Signals) -> None:
     """One tick: turns end, the next group's begins, every head shows its colour."""
     for junction in range(signals.groups.size):
         if signals.groups[junction] > 0 and state.held_by[junction] == 0:
@@ -52,7 +51,7 @@ def advance_lights(state, signals):
 
 
 @kernel
-def show_lights(state, signals):
+def show_lights(state: State, signals: Signals) -> None:
     """Sets each head's colour from its junction's phase, or as it is forced to."""
     for signal in range(signals.kind.size):
         if signals.kind[signal] != _LIGHT:
@@ -74,7 +73,7 @@ def show_lights(state, signals):
 
 
 @kernel
-def hold_lights(state, signals, junction, holder):
+def hold_lights(state: State, signals: Signals, junction: int, holder: int) -> None:
     """Takes a junction's lights out of their turns: all red until `force_light` says otherwise.
 
     Args:
@@ -90,7 +89,7 @@ def hold_lights(state, signals, junction, holder):
 
 
 @kernel
-def release_lights(state, signals, junction):
+def release_lights(state: State, signals: Signals, junction: int) -> None:
     """Gives a junction's lights back to their turns, which go on where they stood."""
     state.held_by[junction] = 0
     for signal in range(signals.kind.size):

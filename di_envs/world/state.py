@@ -140,8 +140,18 @@ class Capacity(NamedTuple):
         return self.first_scenario_actor + self.scenario_actors
 
     @property
+    def vehicle_end(self) -> int:
+        """First actor id behind the vehicles: that of the first walker."""
+        return self.egos + self.vehicles
+
+    @property
+    def walker_end(self) -> int:
+        """First actor id behind the walkers: that of the first pole."""
+        return self.vehicle_end + self.walkers
+
+    @property
     def first_scenario_actor(self) -> int:
-        return self.egos + self.vehicles + self.walkers + self.props
+        return self.walker_end + self.props
 
 
 _F8, _I8, _I4, _I1, _U8 = "f8", "i8", "i4", "i1", "u8"

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One tick of a world: the order in which everything moves."""
 
 from __future__ import annotations
@@ -8,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
@@ -18,13 +18,13 @@ from di_envs.world.events.watching import detect_events
 from di_envs.world.lights import advance_lights
 from di_envs.world.scenarios.staging import move_scenarios, occupy_crossings, watch_scenarios
 from di_envs.world.scenarios.tables import ScenarioTables
-from di_envs.world.state import ActorKind, Routes
+from di_envs.world.state import ActorKind, Routes, State
 from di_envs.world.traffic.approach import Requests, note_ego_arrival
-from di_envs.world.traffic.decisions import Leaders, choose_speed, find_leaders
 from di_envs.world.traffic.lane_change import change_lanes
 from di_envs.world.traffic.motion import move_vehicle, take_another_way
 from di_envs.world.traffic.occupancy import Occupancy, fill_occupancy
 from di_envs.world.traffic.right_of_way import update_grants
+from di_envs.world.traffic.speed_choice import Leaders, choose_speed, find_leaders
 from di_envs.world.traffic.tables import TrafficTables
 from di_envs.world.walkers.strolling import mark_busy_crosswalks, move_walkers
 from di_envs.world.walkers.walk_graph import WalkGraph
@@ -60,7 +60,15 @@ class Scratch(NamedTuple):
 
 
 @kernel
-def advance(state, scenery, scratch, vehicle_end, walker_end, ticks, out):
+def advance(
+    state: State,
+    scenery: Scenery,
+    scratch: Scratch,
+    vehicle_end: int,
+    walker_end: int,
+    ticks: int,
+    out: Float64,
+) -> int:
     """Moves a world on by `ticks` ticks; the egos' controls are held in the state.
 
     Args:
@@ -110,7 +118,9 @@ def advance(state, scenery, scratch, vehicle_end, walker_end, ticks, out):
 
 
 @kernel
-def _move_traffic(state, scenery, scratch, egos, vehicle_end):
+def _move_traffic(
+    state: State, scenery: Scenery, scratch: Scratch, egos: int, vehicle_end: int
+) -> None:
     """All vehicles decide from the same state, then all move."""
     lanes, signals, tables = scenery.lanes, scenery.signals, scenery.tables
     occupancy, requests, leaders = scratch.occupancy, scratch.requests, scratch.leaders

@@ -6,7 +6,6 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,13 @@ from di_envs.numerics.kernels import bind
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.building import (
+    begin_episode,
+    build_scenery,
+    capacity_for,
+    make_scratch,
+    town_tables,
+)
 from di_envs.world.changes import (
     ChangeError,
     check_actor,
@@ -23,31 +29,12 @@ from di_envs.world.changes import (
     move_walker_to,
     remove_actor,
 )
-from di_envs.world.dynamics import EgoModel, locate_ego
 from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
-from di_envs.world.events.watching import begin_events
-from di_envs.world.lights import start_lights
-from di_envs.world.poles import place_poles
-from di_envs.world.scenarios.tables import actors_needed, call_off, scenario_tables
-from di_envs.world.state import (
-    OCCUPIED_LANES,
-    ActorKind,
-    Capacity,
-    EventKind,
-    Routes,
-    State,
-    state_dtype,
-    views_of,
-)
-from di_envs.world.step import Scenery, Scratch, advance
-from di_envs.world.traffic.approach import make_requests
-from di_envs.world.traffic.decisions import make_leaders
-from di_envs.world.traffic.occupancy import make_occupancy
-from di_envs.world.traffic.spawn import spawn_traffic
-from di_envs.world.traffic.tables import traffic_tables
-from di_envs.world.walkers.strolling import spawn_walkers
-from di_envs.world.walkers.walk_graph import build_walk_graph
+from di_envs.world.scenarios.tables import call_off, scenario_tables
+from di_envs.world.state import Capacity, EventKind, State, state_dtype, views_of
+from di_envs.world.step import Scenery, advance
 
+BATCH_TICKS = 100  # at most, in one call of the kernel: so its event rows suffice
 STATE_VERSION = "2"  # of the record's layout and meaning; a snapshot of another is refused
 
 
@@ -106,9 +93,7 @@ class World:
     def __init__(self, town: Town, config: WorldConfig | None = None) -> None:
         self.town = town
         self.config = config or WorldConfig()
-        self._tables = traffic_tables(town)
-        self._walk = build_walk_graph(town)
-        self._ego_model = EgoModel().parameters()
+        self._tables = town_tables(town)
         self._view: WorldView | None = None
         self._scenery: Scenery
 
@@ -140,34 +125,7 @@ class World:
             ValueError: If the town has too few places for the traffic.
         """
         self._allocate(tuple(plans))
-        state = self._state
-        state.seed[...] = seed
-        for name in (
-            "lane",
-            "path",
-            "previous_lane",
-            "changing_from",
-            "grant",
-            "leaving",
-            "stopped_at",
-        ):
-            getattr(state, name)[...] = -1
-        for name in ("arrival_tick", "walk_edge", "occupied"):
-            getattr(state, name)[...] = -1
-        start_lights(state, self.town.signals)
-        for ego, plan in enumerate(plans):
-            self._place_ego(ego, plan)
-        first_vehicle, first_walker = len(plans), len(plans) + self.config.vehicles
-        spawn_traffic(
-            state,
-            self.town.lanes,
-            self._tables,
-            tuple(plans),
-            first_vehicle,
-            self.config.vehicles,
-        )
-        spawn_walkers(state, self._walk, first_walker, self.config.walkers)
-        place_poles(state, self.town.signals, first_walker + self.config.walkers)
+        begin_episode(self._state, seed, self._scenery, self.view.capacity, self.view.plans)
 
     def advance(self, controls: NDArray[np.float64], ticks: int = 1) -> list[Event]:
         """Holds the egos' controls for some ticks and returns what happened.
@@ -190,7 +148,7 @@ class World:
         """Lets time pass and returns what happened. Nearly all of it without Python's lock."""
         events: list[Event] = []
         while ticks > 0:
-            batch = min(ticks, self._batch)
+            batch = min(ticks, BATCH_TICKS)
             rows = self._advance(
                 self._state, self._scenery, self._scratch, self._vehicle_end, self._walker_end,
                 batch, self._event_rows,
@@ -228,9 +186,9 @@ class World:
         x = float(state.x[actor]) + ahead_m * cos - right_m * sin
         y = float(state.y[actor]) + ahead_m * sin + right_m * cos
         if capacity.egos <= actor < self._vehicle_end:
-            move_vehicle_to(state, self.town.lanes, self._tables, actor, x, y)
+            move_vehicle_to(state, self.town.lanes, self._tables.traffic, actor, x, y)
         elif self._vehicle_end <= actor < self._vehicle_end + capacity.walkers:
-            move_walker_to(state, self._walk, actor, x, y)
+            move_walker_to(state, self._tables.walk, actor, x, y)
         else:
             raise ChangeError(
                 f"actor {actor} cannot be moved: vehicles ({capacity.egos} to "
@@ -280,50 +238,21 @@ class World:
         self._record.view(np.uint8)[...] = snapshot.record.view(np.uint8)
 
     def _capacity(self, plans: tuple[RoutePlan, ...]) -> Capacity:
-        return Capacity(
-            egos=len(plans),
-            vehicles=self.config.vehicles,
-            walkers=self.config.walkers,
-            props=self.town.signals.kind.size,
-            junctions=self.town.signals.groups.size,
-            signals=self.town.signals.kind.size,
-            triggers=sum(len(plan.scenarios) for plan in plans),
-            scenario_actors=actors_needed(plans),
-        )
+        return capacity_for(self.town, plans, self.config.vehicles, self.config.walkers)
 
     def _allocate(self, plans: tuple[RoutePlan, ...]) -> None:
         """Makes a fresh record and the kernels' arguments for these plans."""
         capacity = self._capacity(plans)
-        actors = capacity.actors
         if self._view is None or self._view.plans is not plans:  # else as they are
             scenarios = scenario_tables(self.town, plans, capacity.first_scenario_actor)
         else:
             scenarios = self._scenery.scenarios
         self._record = np.zeros(1, state_dtype(capacity))
         self._state = views_of(self._record)
-        self._vehicle_end = capacity.egos + capacity.vehicles
-        self._walker_end = self._vehicle_end + capacity.walkers
-        self._scenery = Scenery(
-            lanes=self.town.lanes,
-            signals=self.town.signals,
-            crosswalks=self.town.crosswalks,
-            tables=self._tables,
-            walk=self._walk,
-            routes=route_arrays(plans),
-            scenarios=scenarios,
-            ego_model=self._ego_model,
-        )
-        self._scratch = Scratch(
-            occupancy=make_occupancy(self.town.lanes.kind.size, actors, capacity.egos),
-            requests=make_requests(actors),
-            leaders=make_leaders(actors),
-            busy=np.zeros(self.town.crosswalks.width_m.size, np.int8),
-            acceleration=np.zeros(actors),
-            cap=np.zeros(actors),
-            below=np.full(OCCUPIED_LANES, -1, np.int32),
-        )
-        self._batch = 100
-        self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * self._batch, COLUMNS))
+        self._vehicle_end, self._walker_end = capacity.vehicle_end, capacity.walker_end
+        self._scenery = build_scenery(self.town, self._tables, plans, scenarios)
+        self._scratch = make_scratch(self.town, capacity)
+        self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * BATCH_TICKS, COLUMNS))
         self._advance = bind(
             advance,
             self._state,
@@ -331,42 +260,13 @@ class World:
             self._scratch,
             self._vehicle_end,
             self._walker_end,
-            self._batch,
+            BATCH_TICKS,
             self._event_rows,
         )
         read_only = views_of(self._record)
         for array in read_only:
             array.flags.writeable = False
         self._view = WorldView(town=self.town, state=read_only, plans=plans, capacity=capacity)
-
-    def _place_ego(self, ego: int, plan: RoutePlan) -> None:
-        state, model = self._state, EgoModel()
-        state.kind[ego] = ActorKind.CAR
-        state.half_length[ego] = model.half_length_m
-        state.half_width[ego] = model.half_width_m
-        state.height[ego] = model.height_m
-        state.x[ego], state.y[ego], state.z[ego], state.yaw[ego] = plan.points[0]
-        begin_events(state, ego)
-        locate_ego(state, self.town.lanes, ego)
-
-
-def route_arrays(plans: Sequence[RoutePlan]) -> Routes:
-    """The plans one after the other, as kernels read them."""
-
-    def join(parts: list[NDArray[Any]], empty: tuple[int, ...], dtype: str) -> NDArray[Any]:
-        return np.concatenate([np.zeros(empty), *parts]).astype(dtype)
-
-    return Routes(
-        start=np.cumsum([0] + [plan.points.shape[0] for plan in plans]).astype(np.int32),
-        points=join([plan.points for plan in plans], (0, 4), "f8"),
-        option=join([plan.option for plan in plans], (0,), "i1"),
-        lane=join([plan.lane for plan in plans], (0,), "i4"),
-        lane_m=join([plan.lane_m for plan in plans], (0,), "f8"),
-        route_m=join([plan.route_m for plan in plans], (0,), "f8"),
-        target_start=np.cumsum([0] + [plan.targets.size for plan in plans]).astype(np.int32),
-        target=join([plan.targets for plan in plans], (0,), "i4"),
-        timeout_s=np.array([plan.timeout_s for plan in plans], "f8"),
-    )
 
 
 def _event(row: NDArray[np.float64]) -> Event:

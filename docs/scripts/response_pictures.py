@@ -19,8 +19,8 @@ from PIL import Image
 from leaderboard.pages.response_figures import (
     gradient_figure,
     head_figure,
-    situation_figure,
 )
+from leaderboard.pages.situation_figure import situation_figure
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import read_run
 from leaderboard.responding.drive_responses import DriveResponses

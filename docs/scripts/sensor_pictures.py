@@ -10,8 +10,8 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from make_pictures import IMAGES, liveliest_moment
 from numpy.typing import NDArray
+from pictures import IMAGES, liveliest_moment
 from PIL import Image
 
 from di_envs.route_env import RouteEnv

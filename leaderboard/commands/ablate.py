@@ -11,7 +11,7 @@ from rich.console import Console
 
 from leaderboard.commands.ending import say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.commands.study_arguments import StudyArguments
+from leaderboard.commands.study_arguments import StudyArguments, run_study
 
 if TYPE_CHECKING:
     from leaderboard.studies.record import Study
@@ -43,13 +43,26 @@ class Ablate(StudyArguments):
     only: Annotated[Literal["drop", "zero"] | None, says("drop|zero", "both")] = None
     """One way of taking away only."""
 
-    def kind(self) -> str:
-        return "ablation"
+    def run(self) -> int:
+        """Drives the ablation, or shows one; returns the exit code."""
+        return run_study(self, _WhatMatters(names=self.rows, only=self.only))
 
-    def chosen_rows(self) -> Sequence[Row]:
+
+@dataclass(frozen=True, kw_only=True)
+class _WhatMatters:
+    """Which components matter, each taken away in turn."""
+
+    names: tuple[str, ...]
+    only: str | None
+    kind: str = "ablation"
+
+    def rows(self) -> Sequence[Row]:
         from leaderboard.studies.rows import choose_rows
 
-        return choose_rows(self.rows, self.only)
+        return choose_rows(self.names, self.only)
+
+    def measured(self, study: Study, folder: Path) -> Study:
+        return study  # its drives say it all
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
         from leaderboard.pages.study_files import write_ablation

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, closing
@@ -13,11 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rich.console import Console
 from rich.table import Table
 
+from di_envs.files.json_values import indented
+from di_envs.files.whole import write_whole
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
-    from agents.training.collect import Pool
+    from agents.processes import Pool
+    from agents.training.collect import DriveJob, Outcome
 
 COLLECT_HELP = """Let the expert drive in made-up towns, and keep what it did, to train policies on.
 
@@ -72,7 +74,7 @@ class Collect:
         if self.address and self.engine != "ray":
             raise UsageError("--address is of a Ray cluster: add --engine ray")
 
-        from agents.training.collect import CARD_FILE, data_card, warm_up
+        from agents.training.collect import CARD_FILE, compile_for_drives, data_card
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.towns import TRAINING_TOWNS
         from di_envs.config import check_name
@@ -84,14 +86,12 @@ class Collect:
             for town in towns:
                 check_name(town, TRAINING_TOWNS, "training town")
             with compile_progress(Console(stderr=True)):
-                warm_up(towns[0])
+                compile_for_drives(towns[0])
             complete = self._collect(towns)
             card = data_card(self.output)
         except (ValueError, OSError, DriveFileError, SetupError) as error:
             raise UsageError(str(error)) from error
-        text = json.dumps(card, indent=1) + "\n"
-        self.output.mkdir(parents=True, exist_ok=True)
-        (self.output / CARD_FILE).write_text(text, encoding="utf-8")
+        write_whole(self.output / CARD_FILE, indented(card))
         say(f"{card['drives']} drives with {card['moments']} moments, {FRAME_S} s apart.")
         say(f"Weather: {card['weather']}.")
         Console().print(card_table(card))
@@ -104,7 +104,7 @@ class Collect:
         )
         return 0
 
-    def _pool(self) -> AbstractContextManager[Pool] | None:
+    def _pool(self) -> AbstractContextManager[Pool[DriveJob, Outcome]] | None:
         """The cluster; None for processes of this machine."""
         if self.engine == "local":
             return None

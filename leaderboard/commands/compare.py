@@ -37,9 +37,9 @@ class Compare:
 
     def run(self) -> int:
         """Compares; returns the exit code."""
+        from di_envs.rules import rules_named
         from leaderboard.records.rescoring import rescored
         from leaderboard.records.results import ResultsError, read_run
-        from leaderboard.scoring.rules import rules_named
         from leaderboard.studies.comparing import PairingError, compare_runs
         from leaderboard.tables.comparison_table import comparison_tables
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from leaderboard.commands.ending import say
 from leaderboard.commands.scene_arguments import says
-from leaderboard.commands.study_arguments import StudyArguments
+from leaderboard.commands.study_arguments import StudyArguments, run_study
 
 if TYPE_CHECKING:
     from leaderboard.studies.record import Study
@@ -45,14 +45,23 @@ class Edit(StudyArguments):
     experiments: Annotated[tuple[str, ...], says("NAME ...", "all")] = ()
     """Some of: route, speed, map, lights, bev."""
 
-    def kind(self) -> str:
-        return "prompt editing"
+    def run(self) -> int:
+        """Drives the experiments, or shows them; returns the exit code."""
+        return run_study(self, _WhatHolds(names=self.experiments, workers=self.workers))
 
-    def chosen_rows(self) -> Sequence[Row]:
+
+@dataclass(frozen=True, kw_only=True)
+class _WhatHolds:
+    """Which of the paper's findings hold, by experiments."""
+
+    names: tuple[str, ...]
+    workers: int
+    kind: str = "prompt editing"
+
+    def rows(self) -> Sequence[Row]:
         from leaderboard.studies.experiments import choose_experiments
 
-        chosen = choose_experiments(self.experiments)
-        return [row for experiment in chosen for row in experiment.rows]
+        return [row for experiment in choose_experiments(self.names) for row in experiment.rows]
 
     def measured(self, study: Study, folder: Path) -> Study:
         from leaderboard.studies.experiments import choose_experiments
@@ -61,17 +70,18 @@ class Edit(StudyArguments):
         return judged(
             folder,
             study,
-            choose_experiments(self.experiments),
+            choose_experiments(self.names),
             workers=self.workers,
             console=Console(stderr=True),
         )
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
-        from leaderboard.pages.study_files import print_prompt_editing, write_prompt_editing
+        from leaderboard.pages.study_files import write_prompt_editing
         from leaderboard.studies.study_file import STUDY_FILE
+        from leaderboard.tables.prompt_editing_table import prompt_editing_tables
 
         written = write_prompt_editing(folder, study)
-        print_prompt_editing(study, Console())
+        Console().print(prompt_editing_tables(study))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
         return [
             f"Next: driveinsight verify {folder / 'rows' / 'baseline'}       does the claim stand?"

@@ -64,24 +64,26 @@ class Explain:
 
     def run(self) -> int:
         """Writes the page; returns the exit code."""
+        from di_envs.edits.text import EditError
+        from leaderboard.explaining.questions import read_asked
         from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
         from leaderboard.records.results import ResultsError, read_run, run_folder
 
         try:
+            what_if = read_asked(self.what_if)
             folder = run_folder(self.folder)
             run = read_run(folder)
             chosen_route(run, self.route, self.seed)
-        except (ResultsError, RouteChoiceError) as error:
+        except (EditError, ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
         run = dataclasses.replace(run, agent=self.agent or run.agent)
 
-        from di_envs.edits.text import EditError
         from leaderboard.explaining.explanation import ExplainError
         from leaderboard.explaining.route import explain_route
         from leaderboard.pages.explain_page import explain_page
         from leaderboard.pages.report_page import ReportError, write_report
+        from leaderboard.replaying.recorded_agent import RetraceError
         from leaderboard.replaying.replay import ReplayError
-        from leaderboard.replaying.retracing import RetraceError
         from leaderboard.running.compiling import compile_progress
 
         console = Console(stderr=True)
@@ -96,7 +98,7 @@ class Explain:
                     seed=self.seed,
                     every_s=self.every,
                     at_s=self.at,
-                    what_if=self.what_if,
+                    what_if=what_if,
                     ahead_s=self.ahead,
                     on_progress=lambda done, total: bar.update(task, completed=done, total=total),
                 )

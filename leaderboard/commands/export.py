@@ -60,7 +60,7 @@ class Export:
         if self.drives_per_shard < 1 or self.workers < 1:
             raise UsageError("--drives-per-shard and --workers must be at least 1")
 
-        from agents.training.export import ExportConfig, shard_jobs, warm_up
+        from agents.training.export import ExportConfig, compile_for_shards, shard_jobs
         from agents.training.frames import DriveFileError
         from leaderboard.running.compiling import compile_progress
 
@@ -73,7 +73,7 @@ class Export:
             )
             jobs = shard_jobs(self.data, self.output, config, self.drives_per_shard)
             with compile_progress(Console(stderr=True)):
-                warm_up(jobs[0])
+                compile_for_shards(jobs[0])
             written = self._export(jobs)
         except (ValueError, OSError, DriveFileError) as error:
             raise UsageError(str(error)) from error

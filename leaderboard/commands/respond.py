@@ -113,8 +113,8 @@ class Respond:
     ) -> list[DriveResponses]:
         """Responses of every drive, behind a bar that counts seconds of driving."""
         from agents.explain.protocol import NotExplainableError
+        from leaderboard.replaying.recorded_agent import RetraceError
         from leaderboard.replaying.replay import ReplayError
-        from leaderboard.replaying.retracing import RetraceError
         from leaderboard.responding.measuring import measured
         from leaderboard.running.compiling import compile_progress
 
@@ -138,7 +138,8 @@ class Respond:
 
     def _written(self, target: Path, drives: list[DriveResponses]) -> list[Path]:
         """Figures and tables; the tables are printed too."""
-        from leaderboard.pages.response_figures import situation_figure, write_figures
+        from leaderboard.pages.response_figures import write_figures
+        from leaderboard.pages.situation_figure import situation_figure
         from leaderboard.responding.moments import marked_moments, moment_name
         from leaderboard.tables.response_tables import tables_of, write_tables
 

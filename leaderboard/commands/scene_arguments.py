@@ -11,6 +11,7 @@ from leaderboard.commands.ending import UsageError
 
 if TYPE_CHECKING:
     from di_envs.suites import Suite
+    from wrappers.interventions.edit import ObservationEdit
 
 # Those below that are options of the environment; the agent is not
 _OPTIONS = (
@@ -61,8 +62,8 @@ class SceneArguments:
     intervene: Annotated[str, says("EDITS", "none")] = ""
     """Edits of what the agent sees, joined by `;`, such as "drop:routing; set:speed=0@t>5"."""
 
-    def edits(self) -> tuple[str, ...]:
-        """What is edited of what the agent sees, each as records keep it.
+    def edits(self) -> tuple[ObservationEdit, ...]:
+        """What is edited of what the agent sees.
 
         Raises:
             UsageError: If one cannot be read.

@@ -36,10 +36,10 @@ class ScoreByRules:
 
     def run(self) -> int:
         """Scores; returns the exit code."""
+        from di_envs.rules import rules_named
         from leaderboard.records.rescoring import rescored
         from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
-        from leaderboard.scoring.rules import rules_named
-        from leaderboard.tables.comparison_table import rescoring_table
+        from leaderboard.tables.rescoring_table import rescoring_table
 
         try:
             run = read_run(self.path)

@@ -1,11 +1,14 @@
-"""What the commands that drive studies share: their arguments, and how a study is driven."""
+"""What the commands that drive studies share: their arguments, and how a study is driven.
+
+Each says what it studies by a `StudyQuestion`; `run_study` does the rest.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, complain, say
 from leaderboard.commands.engine_arguments import EngineArguments
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyArguments(EngineArguments, SceneArguments):
-    """Whom to study, where, and how much; `kind` and `rows` are the command's."""
+    """Whom to study, where, and how much."""
 
     agent: Annotated[str, says("AGENT", "none; not needed with --show")] = ""
     """A name or a scheme (see `driveinsight agents`), module:Class, or path/to/file.py:Class."""
@@ -36,88 +39,102 @@ class StudyArguments(EngineArguments, SceneArguments):
     show: Annotated[Path | None, says("STUDY", "none")] = None
     """Drive nothing: show the study in this folder, and draw its table and figures anew."""
 
-    def run(self) -> int:
-        """Drives the study, or shows one; returns the exit code."""
-        from leaderboard.records.results import ResultsError
-        from leaderboard.running.jobs import SetupError
-        from leaderboard.studies.study_error import StudyError
 
-        try:
-            return self._drive() if self.show is None else self._show(self.show)
-        except (StudyError, SetupError, ResultsError) as error:
-            raise UsageError(str(error)) from error
+class StudyQuestion(Protocol):
+    """What a command asks: which rows are driven, what is measured on them, what is shown."""
 
+    @property
     def kind(self) -> str:
         """Of study."""
-        raise NotImplementedError
+        ...
 
-    def chosen_rows(self) -> Sequence[Row]:
+    def rows(self) -> Sequence[Row]:
         """What is to be driven beside the baseline and the null row."""
-        raise NotImplementedError
+        ...
 
     def measured(self, study: Study, folder: Path) -> Study:
         """The study with what is measured once all is driven."""
-        return study
+        ...
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
         """Draws and prints a study; returns lines that name the next step."""
-        raise NotImplementedError
+        ...
 
-    def _show(self, path: Path) -> int:
-        from leaderboard.studies.study_error import StudyError
-        from leaderboard.studies.study_file import read_study
 
-        study = read_study(path)
-        if study.kind != self.kind():
-            raise StudyError(
-                f"{path} is a study of another kind, {study.kind}: show it with the command that "
-                "made it"
-            )
-        self._print(study, path if path.is_dir() else path.parent)
-        return 0
+def run_study(arguments: StudyArguments, question: StudyQuestion) -> int:
+    """Drives the study, or shows one; returns the exit code."""
+    from leaderboard.records.results import ResultsError
+    from leaderboard.running.jobs import SetupError
+    from leaderboard.studies import StudyError
 
-    def _drive(self) -> int:
-        if not self.agent:
-            raise UsageError("say whom to study: --agent driveinsight (`driveinsight agents`)")
-        if self.seeds < 1:
-            raise UsageError("--seeds must be at least 1")
-        self.check_engine()
-        rows = tuple(self.chosen_rows())
-        options, suite = self.choose(self.route_ids)
-        name = f"{self.kind()}-{plain_name(self.agent)}-{plain_name(suite.name)}"
-        folder = self.output or Path("results") / name.replace(" ", "-")
+    try:
+        if arguments.show is not None:
+            return _show(arguments.show, question)
+        return _drive(arguments, question)
+    except (StudyError, SetupError, ResultsError) as error:
+        raise UsageError(str(error)) from error
 
-        from leaderboard.pages.study_files import keep_study
-        from leaderboard.running.jobs import RunSpec
-        from leaderboard.studies.driving import StudyPlan, drive_study
 
-        spec = RunSpec(
-            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+def _show(path: Path, question: StudyQuestion) -> int:
+    from leaderboard.studies import StudyError
+    from leaderboard.studies.study_file import read_study
+
+    study = read_study(path)
+    if study.kind != question.kind:
+        raise StudyError(
+            f"{path} is a study of another kind, {study.kind}: show it with the command that made "
+            "it"
         )
-        engine = self.make_engine()
-        with self.connected():
-            study, interrupted = drive_study(
-                StudyPlan(kind=self.kind(), spec=spec, suite=suite, rows=rows),
-                self.seeds,
-                folder=folder,
-                engine=engine,
-                keep=lambda so_far: keep_study(folder, so_far),
-            )
-        if not interrupted:
-            try:
-                study = self.measured(study, folder)
-            except KeyboardInterrupt:
-                interrupted = True
-            keep_study(folder, study)
-        self._print(study, folder)
-        if interrupted:
-            complain("the same command goes on from here", "[yellow]interrupted[/yellow]")
-            return EXIT_INTERRUPTED
-        return 0 if study.complete else EXIT_CRASHED
+    _print(study, path if path.is_dir() else path.parent, question)
+    return 0
 
-    def _print(self, study: Study, folder: Path) -> None:
-        next_steps = self.print_study(study, folder)
-        if study.complete:
-            say(*next_steps)
-        else:
-            say("Next: the same command drives what is missing")
+
+def _drive(arguments: StudyArguments, question: StudyQuestion) -> int:
+    if not arguments.agent:
+        raise UsageError("say whom to study: --agent driveinsight (`driveinsight agents`)")
+    if arguments.seeds < 1:
+        raise UsageError("--seeds must be at least 1")
+    arguments.check_engine()
+    rows = tuple(question.rows())
+    options, suite = arguments.choose(arguments.route_ids)
+    name = f"{question.kind}-{plain_name(arguments.agent)}-{plain_name(suite.name)}"
+    folder = arguments.output or Path("results") / name.replace(" ", "-")
+
+    from leaderboard.pages.study_files import keep_study
+    from leaderboard.running.jobs import RunSpec
+    from leaderboard.studies.driving import StudyPlan, drive_study
+
+    spec = RunSpec(
+        agent=arguments.agent,
+        options=options,
+        rules=arguments.rules,
+        interventions=arguments.edits(),
+    )
+    engine = arguments.make_engine()
+    with arguments.connected():
+        study, interrupted = drive_study(
+            StudyPlan(kind=question.kind, spec=spec, suite=suite, rows=rows),
+            arguments.seeds,
+            folder=folder,
+            engine=engine,
+            keep=lambda so_far: keep_study(folder, so_far),
+        )
+    if not interrupted:
+        try:
+            study = question.measured(study, folder)
+        except KeyboardInterrupt:
+            interrupted = True
+        keep_study(folder, study)
+    _print(study, folder, question)
+    if interrupted:
+        complain("the same command goes on from here", "[yellow]interrupted[/yellow]")
+        return EXIT_INTERRUPTED
+    return 0 if study.complete else EXIT_CRASHED
+
+
+def _print(study: Study, folder: Path, question: StudyQuestion) -> None:
+    next_steps = question.print_study(study, folder)
+    if study.complete:
+        say(*next_steps)
+    else:
+        say("Next: the same command drives what is missing")

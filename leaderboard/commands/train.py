@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
@@ -19,14 +15,7 @@ from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
-    from agents.driveinsight.config import PolicyConfig
-    from agents.driveinsight.model import Policy
-    from agents.training.config import TrainConfig
-    from agents.training.distributed import Team
-    from agents.training.learning import Training
-    from agents.training.loading import Moments
-    from agents.training.loop import Checks
-    from leaderboard.running.displays.training import TrainingDisplay
+    from agents.training.session import Session, TrainingPlan
 
 TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
 
@@ -105,7 +94,7 @@ class Train:
     def run(self) -> int:
         """Trains; returns the exit code."""
         try:
-            import torch
+            import torch  # noqa: F401
         except ImportError as error:
             raise UsageError(
                 f"training needs torch: pip install 'driveinsight[policy]' ({error})"
@@ -114,23 +103,21 @@ class Train:
 
         from agents.driveinsight.weights import WeightsError
         from agents.training.config import TrainingError
-        from agents.training.distributed import joined_team
         from agents.training.frames import DriveFileError
-        from agents.training.learning import Training
-        from agents.training.loading import load_moments
+        from leaderboard.running.training import CheckPlan, run_training
         from leaderboard.running.training_check import CheckError
 
-        torch.set_num_threads(self.threads)
+        check = CheckPlan(routes=self.check_routes, every=self.check_every)
+        console = Console(stderr=True)
         try:
-            with joined_team(self._device()) as (team, device), _one_talks(team):
-                policy, config = self._configs(team)
-                with Console(stderr=True).status("reading drives"):
-                    moments = load_moments(self.data, config.standing_share)
-                held_out = config.held_out if moments.drives > 1 else 0.0  # one is for learning
-                config = dataclasses.replace(config, data=moments.digest, held_out=held_out)
-                return self._train(Training.begin(policy, config, device, team), moments)
+            session, done = run_training(
+                self._plan(), check, console=console, on_begin=_tell_beginning
+            )
         except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
             raise UsageError(str(error)) from error
+        if session.training.team.first:
+            (_tell_trained if done else _tell_stopped)(session)
+        return 0 if done else EXIT_INTERRUPTED
 
     def _check_numbers(self) -> None:
         if self.check_every is not None and self.check_every < 1:
@@ -140,146 +127,48 @@ class Train:
         if self.threads < 1:
             raise UsageError("--threads must be at least 1")
 
-    def _configs(self, team: Team) -> tuple[PolicyConfig, TrainConfig]:
+    def _plan(self) -> TrainingPlan:
+        """What the arguments ask for."""
         from agents.driveinsight.config import config_named
+        from agents.training.config import TrainConfig
+        from agents.training.session import TrainingPlan
 
         try:
-            return config_named(self.config), self._training_config(team)
+            policy = config_named(self.config)
+            training = TrainConfig(
+                steps=self.steps,
+                batch=self.batch,
+                learning_rate=self.learning_rate,
+                planner_rate=self.planner_rate,
+                warm_up=min(200, self.steps // 10),
+                seed=self.seed,
+                overfit=self.overfit,
+                threads=self.threads,
+                held_out=self.held_out,
+            )
         except ValueError as error:
             raise UsageError(str(error)) from error
-
-    def _training_config(self, team: Team) -> TrainConfig:
-        from agents.driveinsight.weights import weights_digest
-        from agents.training.config import TrainConfig
-
-        return TrainConfig(
-            steps=self.steps,
-            batch=self.batch,
-            learning_rate=self.learning_rate,
-            planner_rate=self.planner_rate,
-            warm_up=min(200, self.steps // 10),
-            seed=self.seed,
-            overfit=self.overfit,
-            threads=self.threads,
-            precision=self._precision(),
-            processes=team.size,
-            held_out=0.0 if self.overfit else self.held_out,
-            init_from="" if self.init_from is None else weights_digest(self.init_from),
+        return TrainingPlan(
+            policy=policy,
+            training=training,
+            data=self.data,
+            folder=self.output or Path("runs") / policy.name,
+            init_from=self.init_from,
+            device=self.device,
+            precision=self.precision,
+            workers=self.workers,
         )
 
-    def _train(self, training: Training, moments: Moments) -> int:
-        from agents.training.collect import data_card
-        from agents.training.loading import Samples, batches
-        from agents.training.loop import train
-        from leaderboard.running.compiling import compile_progress
-        from leaderboard.running.displays.training import TrainingDisplay
-        from leaderboard.running.interruption import interruptible
 
-        policy, config, team = training.policy.config, training.config, training.team
-        folder = self.output or Path("runs") / policy.name
-        self._go_on(training, folder)
-        samples = Samples(policy, config, moments)
-        with compile_progress(Console(stderr=True)):
-            samples[0]  # before several processes need the same kernels
-        workers = _free_cores(team) if self.workers is None else self.workers
-        data = batches(samples, first_step=training.step, workers=workers, team=team)
-        show = TrainingDisplay(done=training.step, steps=config.steps, batch=config.batch)
-        with (
-            interruptible() as interruption,
-            closing(data),
-            show,
-            self._checks(training, show, lambda: interruption.requested) as checks,
-        ):
-            done = train(
-                training,
-                data,
-                folder,
-                on_step=show.step,
-                stop=lambda: interruption.requested,
-                checks=checks,
-                about_data={str(folder): data_card(folder) for folder in self.data},
-            )
-        if not done:
-            return _tell_stopped(training)
-        return _tell(training, folder) if team.first else 0
-
-    def _go_on(self, training: Training, folder: Path) -> None:
-        """Goes on with the training that the folder holds, or with another policy's weights."""
-        from agents.driveinsight.weights import take_weights
-        from agents.training.loop import CHECKPOINT_FILE
-
-        if (folder / CHECKPOINT_FILE).exists():
-            training.load(folder / CHECKPOINT_FILE)
-            say(f"Goes on from step {training.step} of {folder}.")
-        elif self.init_from is not None:
-            taken, left = take_weights(training.policy, self.init_from)
-            total = len(training.policy.state_dict())
-            say(f"Taken from {self.init_from}: {len(taken)} of {total} tensors: {_parts(taken)}.")
-            if left:
-                say(f"Not taken, as nothing here has their name and shape: {_parts(left)}.")
-
-    def _device(self) -> str:
-        import torch
-
-        if self.device != "auto":
-            return self.device
-        return "cuda" if torch.cuda.is_available() else "cpu"
-
-    def _precision(self) -> str:
-        import torch
-
-        if self.precision != "auto":
-            return self.precision
-        if self._device() == "cuda":
-            fast = torch.cuda.is_bf16_supported(including_emulation=False)
-        else:
-            fast = torch.cpu.get_capabilities().get("amx_bf16", False)
-        return "bfloat16" if fast else "float32"
-
-    @contextmanager
-    def _checks(
-        self, training: Training, show: TrainingDisplay, stop: Callable[[], bool]
-    ) -> Iterator[Checks | None]:
-        from agents.training.loop import Checks
-        from leaderboard.running.training_check import ClosedLoopCheck
-
-        if not self.check_routes or self.overfit or not training.team.first:
-            yield None
-            return
-        every = self.check_every or max(training.config.steps // 5, 1)
-        with (
-            TemporaryDirectory(prefix="driveinsight-") as folder,
-            ClosedLoopCheck(
-                training.policy.config,
-                Path(folder),
-                self.check_routes,
-                stop=stop,
-                on_route=show.route,
-            ) as check,
-        ):
-
-            def score(policy: Policy) -> Mapping[str, float] | None:
-                found = check(policy)
-                if found is not None:
-                    show.checked(found["driving_score"])
-                return found
-
-            yield Checks(every=every, score=score)
-
-
-@contextmanager
-def _one_talks(team: Team) -> Iterator[None]:
-    """Of a team only the first process is heard, but for errors."""
-    if team.first:
-        yield
-        return
-    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
-        yield
-
-
-def _free_cores(team: Team) -> int:
-    """Each process's part of the cores that are left when each has one; one at least."""
-    return max((os.cpu_count() or 2) // team.here - 1, 1)
+def _tell_beginning(session: Session) -> None:
+    training, plan = session.training, session.plan
+    if session.resumed:
+        say(f"Goes on from step {training.step} of {plan.folder}.")
+    elif plan.init_from is not None:
+        count = f"{len(session.taken)} of {len(training.policy.state_dict())} tensors"
+        say(f"Taken from {plan.init_from}: {count}: {_parts(session.taken)}.")
+        if session.left:
+            say(f"Not taken, as nothing here has their name and shape: {_parts(session.left)}.")
 
 
 def _parts(names: Sequence[str]) -> str:
@@ -288,24 +177,25 @@ def _parts(names: Sequence[str]) -> str:
     return ", ".join(f"{part} ({count})" for part, count in counts.items())
 
 
-def _tell_stopped(training: Training) -> int:
+def _tell_stopped(session: Session) -> None:
+    step, steps = session.training.step, session.training.config.steps
     say(
-        f"Stopped at step {training.step} of {training.config.steps}; a checkpoint is written.",
+        f"Stopped at step {step} of {steps}; a checkpoint is written.",
         "Next: the same command again goes on",
     )
-    return EXIT_INTERRUPTED
 
 
-def _tell(training: Training, folder: Path) -> int:
+def _tell_trained(session: Session) -> None:
     from agents.training.log import HELD_OUT, read_rows, write_curve
     from agents.training.loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
+    folder = session.plan.folder
     log, checked = read_rows(folder / LOG_FILE), read_rows(folder / CHECKS_FILE)
     curve = folder / "curve.png"
     drawn = write_curve(curve, log, checked)
     kept_out = f" (drives kept out: {log[-1][HELD_OUT]:.3f} m)" if HELD_OUT in log[-1] else ""
     loss = f"{log[-1]['waypoints']:.3f} m at the end{kept_out}"
-    say(f"Trained {training.step} steps; waypoint loss {loss}.")
+    say(f"Trained {session.training.step} steps; waypoint loss {loss}.")
     if checked:
         best = max(checked, key=lambda row: row["driving_score"])
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
@@ -314,4 +204,3 @@ def _tell(training: Training, folder: Path) -> int:
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
         f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny",
     )
-    return 0

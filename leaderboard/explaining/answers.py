@@ -1,27 +1,29 @@
-"""Asks what if, once its moment comes in a retraced drive, and gathers the future as it was."""
+"""Answers what if, once its moment comes in a retraced drive, and gathers the future as it was."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
-from agents.base import Observation
+from agents.base import Agent
+from di_envs.route_env import RouteEnv
 from di_envs.saving import restore, save
 from leaderboard.explaining.explanation import Answer, WhatIf
-from leaderboard.explaining.looks import Looking
-from leaderboard.records.record import EventRecord
-from leaderboard.replaying.film import Film, film_every
-from leaderboard.replaying.futures import Future, Moment, drive_on, driver_for
-from leaderboard.replaying.retracing import Decision, Eyes, run_eyes
-from leaderboard.replaying.what_if import Question
+from leaderboard.explaining.looks import DriveLooks
+from leaderboard.explaining.questions import Question
+from leaderboard.replaying.futures import Fork, FutureSoFar, drive_on
+from leaderboard.replaying.going_on import AgentThen
+from leaderboard.replaying.recorded_agent import run_eyes
+from leaderboard.replaying.retracing import Decision, retrace
 from leaderboard.running.episode import close_agent
-from leaderboard.running.log import event_record
+from wrappers.interventions.eyes import Eyes
 
 
-class Asking:
+class Answering:
     """Answers questions about one moment of a drive.
 
     Args:
-        looking: At the drive.
+        looks: At the drive.
         questions: All about the same moment.
         at: How many decisions come before it.
         ahead: How many decisions futures are driven on for.
@@ -30,15 +32,15 @@ class Asking:
 
     def __init__(
         self,
-        looking: Looking,
+        looks: DriveLooks,
         questions: tuple[Question, ...],
         at: int,
         ahead: int,
         on_step: Callable[[], None],
     ) -> None:
-        self._looking, self._questions, self._at, self._ahead = looking, questions, at, ahead
+        self._looks, self._questions, self._at, self._ahead = looks, questions, at, ahead
         self._on_step = on_step
-        self._eyes = [_eyes_for(question, looking) for question in questions]
+        self._eyes = [_eyes_for(question, looks) for question in questions]
         self._answers: list[Answer] = []
         self._base: _AsItWas | None = None
 
@@ -50,7 +52,7 @@ class Asking:
             seen = decision.step.observation, decision.context
             self._eyes = [eyes.look(*seen)[1] for eyes in self._eyes]
         if decision.number == self._at:
-            self._base = _AsItWas(self._looking, decision)
+            self._base = _AsItWas(self._looks, decision)
             self._answers = self._answered(decision)
         elif self._base is not None and decision.number <= self._at + self._ahead:
             self._base.add(decision)
@@ -61,93 +63,89 @@ class Asking:
             return None
         return WhatIf(
             at_s=self._base.at_s,
-            moment=self._looking.place_of(self._at),
+            moment=self._looks.place_of(self._at),
             base=self._base.answer(),
             answers=tuple(self._answers),
         )
 
     def _answered(self, decision: Decision) -> list[Answer]:
-        env = self._looking.env
-        moment = Moment(
-            run=self._looking.run,
-            record=self._looking.record,
-            decision=decision,
-            snapshot=save(env),
-        )
+        looks = self._looks
+        fork = Fork(run=looks.run, record=looks.record, decision=decision, snapshot=save(looks.env))
         pairs = zip(self._questions, self._eyes, strict=True)
-        answers = [self._answer(moment, question, eyes) for question, eyes in pairs]
-        restore(env, moment.snapshot)
+        answers = [self._answer(fork, question, eyes) for question, eyes in pairs]
+        restore(looks.env, fork.snapshot)
         return answers
 
-    def _answer(self, moment: Moment, question: Question, eyes: Eyes) -> Answer:
-        looking = self._looking
-        driver = driver_for(question, moment, looking.env, looking.agent, eyes)
+    def _answer(self, fork: Fork, question: Question, eyes: Eyes) -> Answer:
+        looks = self._looks
+        then = _agent_then(question, fork, looks.env, looks.agent, eyes)
         try:
             future = drive_on(
-                looking.env,
-                moment,
-                driver,
-                question,
+                looks.env,
+                fork,
+                then,
+                () if question.world is None else (question.world,),
                 decisions=self._ahead,
                 on_step=self._on_step,
             )
             return Answer(
                 edit=question.text,
                 control=future.controls[0] if len(future.controls) else None,
-                look=looking.look(driver.agent, future.seen, moment.decision.memory),
+                look=looks.look(then.agent, future.seen, fork.decision.memory),
                 future=future,
             )
         finally:
-            if driver.agent is not looking.agent:
-                close_agent(driver.agent)
+            if then.agent is not looks.agent:
+                close_agent(then.agent)
 
 
 class _AsItWas:
     """The future that was, taken from the drive as it is retraced."""
 
-    def __init__(self, looking: Looking, decision: Decision) -> None:
-        self._looking, self._first, self._last = looking, decision, decision
-        self._seen: Observation = decision.seen
-        self._memory = decision.memory
-        self._film = Film()
-        self._film.add(decision.step)
-        self._events: list[EventRecord] = []
-        self.at_s = decision.time_s
+    def __init__(self, looks: DriveLooks, first: Decision) -> None:
+        self._looks, self._first, self._ended = looks, first, False
+        self._so_far = FutureSoFar(first, looks.env.config.control_dt_s)
+        self.at_s = first.time_s
 
     def add(self, decision: Decision) -> None:
         """Takes up a later moment."""
-        step, every = decision.step, film_every(self._looking.env.config.control_dt_s)
-        if decision.number % every == 0 or decision.control is None:
-            self._film.add(step)
-        self._events += [event_record(event, step.view) for event in step.events]
-        self._last = decision
+        self._ended = decision.control is None
+        self._so_far.add(decision, last=self._ended)
 
     def answer(self) -> Answer:
         """What the agent did, and what came of it."""
-        looking, record, last = self._looking, self._looking.record, self._last
-        first = self._first.number
-        ended = last.control is None
-        future = Future(
-            seen=self._seen,
-            film=self._film,
-            controls=record.control_array()[first : last.number],
-            checks=record.check_array()[first : last.number + 1],
-            events=tuple(self._events),
-            end_s=last.time_s,
-            status=record.status if ended else "",
-            driving_score=float(last.step.info["driving_score"]),
-            route_completion=float(last.step.info["route_completion"]),
-            problem=record.reason if ended else "",
-        )
+        looks, first = self._looks, self._first
+        ending = (looks.record.status, looks.record.reason) if self._ended else ("", "")
         return Answer(
             edit="",
-            control=self._first.control,
-            look=looking.look(looking.agent, self._seen, self._memory),
-            future=future,
+            control=first.control,
+            look=looks.look(looks.agent, first.seen, first.memory),
+            future=self._so_far.future(*ending),
         )
 
 
-def _eyes_for(question: Question, looking: Looking) -> Eyes:
+def _eyes_for(question: Question, looks: DriveLooks) -> Eyes:
     """Eyes that look at the drive from its start, behind the edit."""
-    eyes = run_eyes(looking.run, looking.record, looking.env)
+    eyes = run_eyes(looks.run, looks.record, looks.env)
     return eyes if question.seen is None else eyes.behind(question.seen)
+
+
+def _agent_then(
+    question: Question, fork: Fork, env: RouteEnv, agent: Agent[Any], eyes: Eyes
+) -> AgentThen:
+    """Who drives on with an edit: the agent that retraces the drive, or another one like it.
+
+    Another one is to be closed by the caller.
+    """
+    if not agent.requires.branchable:
+        other = question.interventions.agent(fork.run.agent)
+        return AgentThen(agent=other, memory=_memory_of(other, fork, env), eyes=eyes)
+    if question.within:
+        agent = question.interventions.agent(fork.run.agent)
+    return AgentThen(agent=agent, memory=fork.decision.memory, eyes=eyes)
+
+
+def _memory_of(agent: Agent[Any], fork: Fork, env: RouteEnv) -> Any:
+    """The memory of an agent that hides it, once it has driven to the moment itself."""
+    decisions = retrace(fork.run, fork.record, agent=agent, env=env.twin())
+    return next(d.memory for d in decisions if d.number == fork.decision.number)

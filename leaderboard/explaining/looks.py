@@ -13,12 +13,12 @@ from PIL import Image
 from agents.base import Agent, Observation
 from di_envs.prompt import COMPONENTS
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.camera.config import CameraConfig, rig_of
 from di_envs.world.world import WorldView
 from leaderboard.explaining.explanation import ActivationMaps, Explanation, WhatIf
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.film import Film, film_every
-from leaderboard.replaying.retracing import FRONT, Decision
+from leaderboard.replaying.retracing import Decision
+from leaderboard.running.front_camera import FRONT, front_camera
 
 if TYPE_CHECKING:
     from agents.explain.look import Look
@@ -28,8 +28,8 @@ JPEG_QUALITY = 72
 PRESENT = "prompt_present"
 
 
-class Looking:
-    """Gathers what an explanation is made of."""
+class DriveLooks:
+    """The looks at one drive, as they are gathered: what an explanation is made of."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class Looking:
             controls=np.array(self._controls, np.float32).reshape(-1, 3),
             seen={name: np.stack(rows) for name, rows in self._seen.items()},
             images=tuple(self._images),
-            camera=_front_camera(self.env) if self._images else None,
+            camera=front_camera(self.env.config.cameras) if self._images else None,
             groups=first.groups if first else (),
             gradient=_stacked([r.gradient for r in responses], (0, 0, 2)),
             attention=_stacked([r.attention for r in responses], (0, 0, 0, 0)),
@@ -168,11 +168,6 @@ def _front_image(decision: Decision) -> list[bytes]:
 def _pose(view: WorldView) -> tuple[float, float, float]:
     state, ego = view.state, view.ego
     return float(state.x[ego]), float(state.y[ego]), float(state.yaw[ego])
-
-
-def _front_camera(env: RouteEnv) -> CameraConfig:
-    cameras = rig_of(env.config.cameras).cameras
-    return next(camera for camera in cameras if camera.name == FRONT)
 
 
 def _stacked(arrays: list[NDArray[np.float32]], none: tuple[int, ...]) -> NDArray[np.float32]:

@@ -13,19 +13,20 @@ The drive is retraced with its agent (`retracing.py`), which is looked into as i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from leaderboard.explaining.answers import Asking
+from leaderboard.explaining.answers import Answering
 from leaderboard.explaining.explanation import ExplainError, Explanation
-from leaderboard.explaining.looks import Looking
+from leaderboard.explaining.looks import DriveLooks
+from leaderboard.explaining.questions import AskedEdit, questions_about, read_asked
 from leaderboard.records.chosen_route import chosen_route
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import read_run
 from leaderboard.replaying.futures import AHEAD_S
-from leaderboard.replaying.retracing import retrace, retrace_env, run_agent
+from leaderboard.replaying.recorded_agent import retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from leaderboard.replaying.timed_edits import decisions_before
-from leaderboard.replaying.what_if import read_questions
 from leaderboard.running.episode import close_agent
 
 EVERY_S = 0.2  # between two moments that are looked into
@@ -38,7 +39,7 @@ def explain_route(
     seed: int = 0,
     every_s: float = EVERY_S,
     at_s: float | None = None,
-    what_if: str = "",
+    what_if: str | Sequence[AskedEdit] = "",
     ahead_s: float = AHEAD_S,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Explanation:
@@ -50,7 +51,7 @@ def explain_route(
         seed: Which of the run's seeds.
         every_s: How often the agent is looked into.
         at_s: Game time of the moment that `what_if` is about, and at which the page opens.
-        what_if: Edits joined by `;`, each a question of its own.
+        what_if: Edits, each a question of its own: values, or their text joined by `;`.
         ahead_s: How far the futures of that moment are driven.
         on_progress: Told how many decisions were made, and how many there are to make.
 
@@ -68,31 +69,32 @@ def explain_route(
     for name, value_s in (("every_s", every_s), ("ahead_s", ahead_s)):
         if not value_s > 0.0:
             raise ExplainError(f"{name} must be more than 0 s, not {value_s:g}")
+    edits = read_asked(what_if) if isinstance(what_if, str) else what_if
     env = retrace_env(run, front=True)
-    at = _moment_number(record, at_s, what_if, env.config.control_dt_s)
-    questions = read_questions(what_if, at_s or 0.0, run, env)
+    at = _moment_number(record, at_s, bool(edits), env.config.control_dt_s)
+    questions = questions_about(edits, at_s or 0.0, run, env)
     ahead = max(1, round(ahead_s / env.config.control_dt_s))
     steps = _Counted(record.steps + 1 + len(questions) * ahead, on_progress)
     agent = run_agent(run, env)
     try:
-        looking = Looking(run, record, env, agent, every_s, at if questions else None)
-        asking = Asking(looking, questions, at, ahead, steps.one_more)
+        looks = DriveLooks(run, record, env, agent, every_s, at if questions else None)
+        answering = Answering(looks, questions, at, ahead, steps.one_more)
         for decision in retrace(run, record, agent=agent, env=env):
-            looking.add(decision)
-            asking.add(decision)
+            looks.add(decision)
+            answering.add(decision)
             steps.one_more()
-        return looking.explanation(asking.what_if(), at_s or 0.0)
+        return looks.explanation(answering.what_if(), at_s or 0.0)
     finally:
         close_agent(agent)
         env.close()
 
 
 def _moment_number(
-    record: RouteRecord, at_s: float | None, what_if: str, control_dt_s: float
+    record: RouteRecord, at_s: float | None, asked: bool, control_dt_s: float
 ) -> int:
     """How many decisions come before the moment that is asked about."""
     if at_s is None:
-        if what_if.strip():
+        if asked:
             raise ExplainError("say at which moment what if is asked: --at SECONDS (at_s=)")
         return 0
     number = decisions_before(at_s, control_dt_s)

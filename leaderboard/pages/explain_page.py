@@ -23,14 +23,15 @@ from leaderboard.explaining.explanation import Answer, Explanation, WhatIf
 from leaderboard.pages.explain_tables import answers_table, telling_events
 from leaderboard.pages.looks import look_columns, map_columns
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
-from leaderboard.pages.report_page import event_heads, film_meta, player_parts
+from leaderboard.pages.report_page import player_parts
 from leaderboard.pages.report_tables import event_text, facts_table
+from leaderboard.pages.route_films import event_heads, film_meta
 from leaderboard.pages.told import told_columns
 from leaderboard.pages.town_svg import town_svg
 from leaderboard.records.blocks import Column, write_block
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import RunRecord
-from leaderboard.replaying.retracing import FRONT
+from leaderboard.running.front_camera import FRONT
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-explanation", 1
 SCRIPTS = (
@@ -82,10 +83,10 @@ def explain_page(explanation: Explanation) -> Page:
 def _notes(explanation: Explanation) -> Iterator[str]:
     """What a reader must know before the pictures."""
     yield from explanation.missing
-    done = explanation.record.interventions
+    run, done = explanation.run, explanation.record.interventions
     if done:
         yield f"With what was done to the world, or to what the agent saw: {'; '.join(done)}."
-    differences = footing_differences(footing_here(), footing_of(explanation.run))
+    differences = footing_differences(footing_here(run.agent), footing_of(run))
     if differences:
         yield (
             f"Retraced on {'; '.join(differences)} in the run; the agent saw and did the same all "

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
+from di_envs.rules import rules_named
 from leaderboard.explaining.explanation import Answer, WhatIf
 from leaderboard.pages.markup import Cell, Heading, Markup, TableOf
 from leaderboard.pages.report_tables import event_text
 from leaderboard.records.record import EventRecord, RunRecord
 from leaderboard.replaying.futures import Future
-from leaderboard.scoring.rules import rules_named
 
 _HEADINGS = (
     Heading(name="edit"),

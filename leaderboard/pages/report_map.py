@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from di_envs.town.town import Town
+from di_envs.world.event_names import EVENT_KEYS
 from leaderboard.pages.markup import Markup, element
 from leaderboard.pages.report_tables import event_text, met, shown_events
 from leaderboard.pages.town_svg import CM, line_path, simplified, town_bounds, town_svg
@@ -41,7 +42,7 @@ def _way(record: RouteRecord) -> Markup:
 
 def _marks(run: RunRecord, record: RouteRecord) -> Iterator[Markup]:
     for event in shown_events(record, run):
-        kind = event.kind.name.lower()
+        kind = EVENT_KEYS[event.kind]
         met_text = f" ({met(event)})" if met(event) else ""
         label = (
             f"{event_text(event)}{met_text}, {event.time_s:.1f} s, "

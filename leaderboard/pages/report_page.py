@@ -5,56 +5,35 @@ The file holds everything it needs, asks for nothing else, and is readable witho
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
-from di_envs.route_env import RouteEnv
+from di_envs.files.whole import write_whole
 from di_envs.town.town import Town
-from di_envs.world.kinds import ActorKind
-from di_envs.world.state import TICK_S
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
 from leaderboard.pages.report_map import map_svg
 from leaderboard.pages.report_tables import (
     event_table,
-    event_text,
     facts_table,
-    met,
     route_table,
-    shown_events,
     summary_cards,
 )
-from leaderboard.records.blocks import write_block
+from leaderboard.pages.route_films import RouteFilm, event_heads, film_routes
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.replaying.film import Film, film_of
-from leaderboard.replaying.replay import ReplayError, ReplayStep, replay, replay_env
+from leaderboard.replaying.replay import ReplayError, replay_env
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-report", 1
 SCRIPTS = (
     *("blocks.js", "film.js", "town.js", "scene.js", "player.js", "transport.js"),
     *("tables.js", "overview.js", "report.js"),
 )
-AGREES_M = 0.002  # a trace is written to the millimetre
 
 
 class ReportError(Exception):
     """A page that cannot be made; the message says what to do."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RouteFilm:
-    """A route of the page: its record, and its packed film or why there is none."""
-
-    record: RouteRecord
-    block: str = ""
-    problem: str = ""
 
 
 def chosen_routes(run: RunRecord, route_ids: Sequence[str]) -> tuple[RouteRecord, ...]:
@@ -71,65 +50,6 @@ def chosen_routes(run: RunRecord, route_ids: Sequence[str]) -> tuple[RouteRecord
             raise ReportError(f"the run has no route {route_id}; it has: {', '.join(known)}")
     wanted = set(route_ids) or set(known)
     return tuple(record for record in run.routes if record.route_id in wanted)
-
-
-def film_routes(
-    run: RunRecord,
-    records: Sequence[RouteRecord],
-    env: RouteEnv,
-    on_route: Callable[[RouteFilm], None] = lambda film: None,
-) -> list[RouteFilm]:
-    """Replays routes and packs what is seen; one that cannot be replayed says why.
-
-    Args:
-        run: The run.
-        records: Routes of it.
-        env: From `replay_env(run)`.
-        on_route: Called with each as it is done.
-    """
-    films = []
-    for record in records:
-        films.append(_film_route(run, record, env))
-        on_route(films[-1])
-    return films
-
-
-def _film_route(run: RunRecord, record: RouteRecord, env: RouteEnv) -> RouteFilm:
-    if record.lost:
-        return RouteFilm(record=record, problem=f"lost ({record.status}): {record.reason}")
-    try:
-        film = film_of(_checked(replay(run, record, env=env), record), env.config.control_dt_s)
-    except ReplayError as error:
-        return RouteFilm(record=record, problem=f"cannot be replayed here: {error}")
-    return RouteFilm(record=record, block=write_block(film_meta(film, record), film.columns()))
-
-
-def film_meta(film: Film, record: RouteRecord) -> dict[str, Any]:
-    """What a page's player is to know of a film beside its columns."""
-    return {
-        "route": record.route_id,
-        "seed": record.seed,
-        "tick_s": TICK_S,
-        "length_m": record.length_m,
-        "kinds": [kind.name.lower() for kind in ActorKind],
-        "moments": film.moments,
-    }
-
-
-def _checked(steps: Iterator[ReplayStep], record: RouteRecord) -> Iterator[ReplayStep]:
-    """The steps of a replay, as long as they go where the record says that the ego was."""
-    wanted = {row[0]: np.array(row[1:4]) for row in record.trace}
-    for step in steps:
-        place = wanted.pop(step.time_s, None)
-        if place is not None:
-            state, ego = step.view.state, step.view.ego
-            here = np.array([state.x[ego], state.y[ego], state.z[ego]])
-            if not np.abs(here - place).max() < AGREES_M:
-                raise ReplayError(
-                    f"at {step.time_s:g} s the replay is {math.dist(here, place):.3f} m from where "
-                    "the record was; `driveinsight verify` says what differs"
-                )
-        yield step
 
 
 def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
@@ -174,13 +94,9 @@ def write_report(path: Path, page: str) -> int:
         ReportError: If it cannot be written.
     """
     data = page.encode()
-    beside = path.with_name(f".{path.name}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        os.replace(beside, path)
+        write_whole(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise ReportError(
             f"cannot write {path} ({error.strerror}): choose another --output"
         ) from error
@@ -262,20 +178,3 @@ def _route_head(run: RunRecord, film: RouteFilm) -> dict[str, Any]:
         "game_s": record.game_s,
         "events": event_heads(record, run),
     }
-
-
-def event_heads(record: RouteRecord, run: RunRecord) -> list[dict[str, Any]]:
-    """A route's events as a page's script takes them."""
-    counted = set(shown_events(record, run))
-    return [
-        {
-            "time_s": event.time_s,
-            "kind": event.kind.name.lower(),
-            "text": event_text(event),
-            "with": met(event),
-            "x": round(event.x, 2),
-            "y": round(event.y, 2),
-            "counts": event in counted,
-        }
-        for event in record.events
-    ]

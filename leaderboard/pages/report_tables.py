@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from di_envs.rules import rules_named
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from leaderboard.pages.markup import Cell, Content, Heading, Markup, TableOf, element, joined
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
-from leaderboard.scoring.rules import rules_named
 from leaderboard.statistics.confidence import mean_interval
 from leaderboard.tables.run_tables import (
     mean_bound,
+    plain_status,
     scored_per_km,
     seed_means,
     summary,
@@ -54,9 +56,9 @@ def event_text(event: EventRecord) -> str:
     if event.kind == EventKind.COMPLETED:
         return "route completed"
     if event.kind == EventKind.OUTSIDE_LANES:
-        return f"outside lanes for {event.value:.1f} m"
+        return f"{EVENT_NAMES[event.kind]} for {event.value:.1f} m"
     if event.kind == EventKind.MIN_SPEED:
-        return f"at {event.value:.0f} % of the traffic's pace"
+        return f"{EVENT_NAMES[event.kind]}: {event.value:.0f} % of the traffic's pace"
     return EVENT_NAMES[event.kind]
 
 
@@ -103,7 +105,7 @@ def _route_row(run: RunRecord, record: RouteRecord, *, replayed: bool) -> list[C
     ]
     if record.lost:
         dashes = [Cell(shows="-", sort=-1.0) for _ in range(7)]
-        why = Cell(shows=element("span", f"lost: {_plain(record)}", class_="lost"))
+        why = Cell(shows=element("span", f"lost: {plain_status(record.status)}", class_="lost"))
         return [*first, *dashes, why, Cell(shows=record.reason), Cell(shows="")]
     score = record.score
     bound = "-" if record.bound is None else f"{record.bound.route_completion:.1f}"
@@ -116,14 +118,10 @@ def _route_row(run: RunRecord, record: RouteRecord, *, replayed: bool) -> list[C
         Cell(shows=f"{scored_per_km([record], run):.2f}"),
         Cell(shows=f"{record.done_m / 1000:.2f}", note=f"of {record.length_m / 1000:.2f} km"),
         Cell(shows=f"{record.game_s:.1f}", sort=record.game_s),
-        Cell(shows=_plain(record), note=record.reason or None),
+        Cell(shows=plain_status(record.status), note=record.reason or None),
         Cell(shows=summary([record], rules_named(run.rules))),
         Cell(shows=scenarios_text(record)),
     ]
-
-
-def _plain(record: RouteRecord) -> str:
-    return record.status.removeprefix("Failed - ")
 
 
 def _interventions(record: RouteRecord) -> str | None:
@@ -170,7 +168,7 @@ def event_table(run: RunRecord, records: Sequence[RouteRecord], shown: set[int])
             time: Content = f"{event.time_s:.2f}"
             if record.index in shown:
                 time = moment_link(record, event.time_s, time)
-            mark = element("span", "", class_=f"dot kind-{event.kind.name.lower()}")
+            mark = element("span", "", class_=f"dot kind-{EVENT_KEYS[event.kind]}")
             rows.append(
                 [
                     Cell(shows=record.route_id),
@@ -207,7 +205,7 @@ def facts_table(run: RunRecord) -> Markup:
     """What the results rest on."""
     options = ", ".join(f"{name}={value}" for name, value in sorted(run.options.items()))
     pairs = {
-        "agent": f"{run.agent} ({run.agent_hash})",
+        "agent": f"{run.agent} ({run.agent_version})",
         "track": run.track,
         "suite": f"{run.suite}" + (f", version {run.suite_version}" if run.suite_version else ""),
         "town": f"{run.town} ({run.town_hash})",

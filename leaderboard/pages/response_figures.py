@@ -1,10 +1,8 @@
 """Responses of a drive, drawn as the paper draws them.
 
-    gradients   Gx and Gy of each component over the route, with marked moments
-    attention   shares of each head over the route
-    heads       shares of each head at the marked moments as bars, the drive's mean as a line
-
-Over several drives, `situation_figure` shows how responses change with the situation.
+gradients   Gx and Gy of each component over the route, with marked moments
+attention   shares of each head over the route
+heads       shares of each head at the marked moments as bars, the drive's mean as a line
 """
 
 from __future__ import annotations
@@ -16,10 +14,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from leaderboard.responding.by_situation import ratios_in
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 from leaderboard.responding.moments import moment_name, stretches
 
 MOMENT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:olive")
@@ -27,7 +23,7 @@ GROUP_COLOURS = (
     *("#4e79a7", "#a0cbe8", "#f28e2b", "#59a14f", "#b6992d"),
     *("#e15759", "#d37295", "#79706e", "#bab0ac", "#b07aa1"),
 )
-_SITUATION_COLOURS = {
+SITUATION_COLOURS = {
     "junction": "#8f8fd1",
     "turning": "#4bb3a5",
     "obstacle": "#d98d4f",
@@ -35,7 +31,7 @@ _SITUATION_COLOURS = {
     "stop_sign": "#b85fa8",
     "free": "#b9c48a",
 }
-_DPI = 110
+DPI = 110
 
 
 def write_figures(
@@ -71,7 +67,7 @@ def write_figures(
 def gradient_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     """Gx and Gy of each component as curves, the situations below."""
     count = len(drive.groups)
-    figure = Figure(figsize=(10.0, 1.6 + 0.85 * count), dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=(10.0, 1.6 + 0.85 * count), dpi=DPI, layout="constrained")
     rows: Any = figure.subplots(
         count + 1, 1, sharex=True, height_ratios=[1.0] * count + [1.6], squeeze=False
     )[:, 0]
@@ -83,7 +79,7 @@ def gradient_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     for place, (axes, name) in enumerate(zip(rows, drive.groups, strict=False)):
         axes.plot(drive.time_s, drive.gradient[:, place, 0], color="#1f4e79", lw=1.2, label="Gx")
         axes.plot(drive.time_s, drive.gradient[:, place, 1], color="#c8553d", lw=1.2, label="Gy")
-        axes.set_ylabel(_plain(name), rotation=0, ha="right", va="center", fontsize=9)
+        axes.set_ylabel(plain_words(name), rotation=0, ha="right", va="center", fontsize=9)
         axes.set_ylim(bottom=0.0)
         axes.yaxis.set_label_coords(-0.055, 0.5)
         _finish(axes, drive, marked)
@@ -114,7 +110,7 @@ def attention_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
         axes.set_xlabel("game time [s]", fontsize=8)
     patches = [_patch(colour) for colour in _colours(drive)]
     figure.legend(
-        patches, [_plain(name) for name in drive.groups], loc="outside lower center", ncols=5
+        patches, [plain_words(name) for name in drive.groups], loc="outside lower center", ncols=5
     )
     return figure
 
@@ -138,7 +134,7 @@ def head_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
             _head_title(axes, layer, head)
             axes.tick_params(labelsize=7)
     for axes in panels[-1]:
-        labels = [_plain(name) for name in drive.groups]
+        labels = [plain_words(name) for name in drive.groups]
         axes.set_xticks(np.arange(count), labels, rotation=90, fontsize=7)
     names = [moment_name(drive, index) for index in marked]
     patches = [_patch(_colour(place)) for place in range(len(marked))]
@@ -148,46 +144,9 @@ def head_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     return figure
 
 
-def situation_figure(drives: Sequence[DriveResponses]) -> Figure:
-    """How each component's response changes with the situation: ratios with their intervals."""
-    found = {name: ratios_in(drives, name) for name in drives[0].situations}
-    shown = {name: ratios for name, ratios in found.items() if ratios}
-    groups = drives[0].groups
-    figure = Figure(figsize=(10.0, 1.8 + 0.52 * len(groups)), dpi=_DPI, layout="constrained")
-    axes: Any = figure.subplots()
-    figure.suptitle(
-        f"Responses in a situation, over those in all other moments\n{drives[0].name}, "
-        f"{len(drives)} drives",
-        fontsize=11,
-    )
-    step = 0.8 / max(len(shown), 1)
-    for row, (name, ratios) in enumerate(shown.items()):
-        for place, group in enumerate(groups):
-            ratio = ratios[group]
-            height = place - 0.4 + (row + 0.5) * step
-            colour = _SITUATION_COLOURS[name]
-            if ratio.low is not None and ratio.high is not None:
-                axes.plot([ratio.low, ratio.high], [height, height], color=colour, lw=2.4)
-            label = _plain(name) if place == 0 else None
-            axes.plot(ratio.value, height, "o", ms=4.5, color=colour, label=label)
-    axes.axvline(1.0, color="black", lw=1.0)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(labelsize=8)
-    axes.set_yticks(range(len(groups)), [_plain(name) for name in groups], fontsize=9)
-    axes.invert_yaxis()
-    axes.grid(axis="x", which="both", alpha=0.25)
-    axes.set_xlabel("ratio of mean strengths, 95 % intervals over routes")
-    if shown:
-        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    return figure
-
-
 def _panels(layers: int, heads: int, *, width: float, height: float, top: float) -> Any:
     size = (max(width * heads, 6.0), height * layers + top)
-    figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     return figure, figure.subplots(layers, heads, sharex=True, sharey="row", squeeze=False)
 
 
@@ -196,8 +155,8 @@ def _situation_strips(axes: Any, drive: DriveResponses) -> None:
     for row, name in enumerate(drive.situations):
         for first, last in stretches(drive.holding(name)):
             start, end = drive.time_s[first] - half, drive.time_s[last - 1] + half
-            axes.barh(row, end - start, left=start, height=0.8, color=_SITUATION_COLOURS[name])
-    names = [_plain(name) for name in drive.situations]
+            axes.barh(row, end - start, left=start, height=0.8, color=SITUATION_COLOURS[name])
+    names = [plain_words(name) for name in drive.situations]
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.invert_yaxis()
 
@@ -231,7 +190,3 @@ def _colour(place: int) -> str:
 
 def _colours(drive: DriveResponses) -> list[str]:
     return [GROUP_COLOURS[place % len(GROUP_COLOURS)] for place in range(len(drive.groups))]
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")

@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console, Group
-from rich.text import Text
-
+from di_envs.files.whole import write_whole
 from leaderboard.pages.ablation_picture import write_ablation_picture
 from leaderboard.pages.prompt_pictures import write_prompt_picture
-from leaderboard.records.results import replace_file
-from leaderboard.studies.ablation import Ablation, findings, work_out
+from leaderboard.studies import StudyError
+from leaderboard.studies.ablation import Ablation, work_out
+from leaderboard.studies.ablation_findings import findings
 from leaderboard.studies.experiments import EXPERIMENTS
 from leaderboard.studies.prompt_editing import (
-    MISSING,
     finding_sentence,
     judgements_of,
     prompt_findings,
 )
 from leaderboard.studies.record import Study
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import write_study
-from leaderboard.tables.ablation_table import (
-    ablation_markdown,
-    ablation_tables,
-    table_lines,
-    title,
-)
+from leaderboard.tables.ablation_cells import title
+from leaderboard.tables.ablation_table import ablation_markdown, table_lines
+from leaderboard.tables.prompt_editing_table import missing_lines
 
 TABLE_FILE, PICTURE_FILE = "study.md", "study.png"
 
@@ -53,7 +47,7 @@ def write_ablation(folder: Path, ablation: Ablation) -> list[Path]:
     picture, table = folder / PICTURE_FILE, folder / TABLE_FILE
     try:
         drawn = write_ablation_picture(picture, ablation)
-        replace_file(table, ablation_markdown(ablation, PICTURE_FILE if drawn else ""))
+        write_whole(table, ablation_markdown(ablation, PICTURE_FILE if drawn else ""))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [table, picture] if drawn else [table]
@@ -68,7 +62,8 @@ def write_prompt_editing(folder: Path, study: Study) -> list[Path]:
     Raises:
         StudyError: If something cannot be.
     """
-    lines, written = [f"# {title(work_out(study))}", ""], []
+    ablation = work_out(study)
+    lines, written = [f"# {title(ablation)}", ""], []
     try:
         for judgement in judgements_of(study):
             picture = folder / f"{judgement.experiment}.png"
@@ -78,28 +73,9 @@ def write_prompt_editing(folder: Path, study: Study) -> list[Path]:
             if write_prompt_picture(picture, judgement):
                 written.append(picture)
                 lines += [f"![{experiment.title}]({picture.name})", ""]
-        lines += [f"- {line}" for line in _missing(study)]
-        lines += ["", *table_lines(work_out(study))]
-        replace_file(folder / TABLE_FILE, "\n".join(lines))
+        lines += [f"- {line}" for line in missing_lines(study)]
+        lines += ["", *table_lines(ablation)]
+        write_whole(folder / TABLE_FILE, "\n".join(lines))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [folder / TABLE_FILE, *written]
-
-
-def print_prompt_editing(study: Study, console: Console) -> None:
-    """Prints what was found, then the rows' scores."""
-    lines = []
-    for judgement in judgements_of(study):
-        experiment = EXPERIMENTS[judgement.experiment]
-        lines += [
-            Text(experiment.title, style="bold"),
-            Text(f"The paper: {experiment.claim}.", style="dim"),
-            Text(f"{finding_sentence(judgement)}\n"),
-        ]
-    lines += [Text(line) for line in _missing(study)]
-    console.print(Group(*lines, ablation_tables(work_out(study))))
-
-
-def _missing(study: Study) -> list[str]:
-    found = study.extra.get(MISSING, {})
-    return [f"Nothing on {EXPERIMENTS[name].title}: {why}" for name, why in found.items()]

@@ -13,10 +13,6 @@ deflated and put in base 64.
 
 from __future__ import annotations
 
-import base64
-import binascii
-import json
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_PLANES = 4  # bytes of a difference
+from di_envs.files.json_values import compact, from_json, parsed
+from di_envs.files.planes import from_planes, from_text, to_planes, to_text
+
+_FOLDED, _PLANES = "<u4", 4  # of a difference, and its bytes
+_MOST_DIFFERENCES = 8  # no column of ours has more than 2
 _LIMIT = 2**29  # of a number in steps: a difference of differences of such still has 32 bits
 
 
@@ -42,6 +42,24 @@ class Column:
     values: ArrayLike
     step: float = 1.0
     differences: int = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ColumnHead:
+    name: str
+    count: int
+    step: float
+    differences: int = 2
+
+    def __post_init__(self) -> None:
+        if self.count < 0 or not 0 <= self.differences <= _MOST_DIFFERENCES:
+            raise ValueError(f"column '{self.name}' has an impossible count or differences")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Head:
+    meta: dict[str, Any]
+    columns: tuple[_ColumnHead, ...]
 
 
 class BlockError(ValueError):
@@ -66,9 +84,8 @@ def write_block(meta: Mapping[str, Any], columns: Mapping[str, Column]) -> str:
             entry["differences"] = column.differences
         heads.append(entry)
         bodies.append(_planes(whole, column.differences))
-    head = json.dumps({"meta": meta, "columns": heads}, separators=(",", ":"), allow_nan=False)
-    data = head.encode() + b"\n" + b"".join(bodies)
-    return base64.b64encode(zlib.compress(data, 9)).decode("ascii")
+    head = compact({"meta": meta, "columns": heads})
+    return to_text(head.encode() + b"\n" + b"".join(bodies))
 
 
 def read_block(text: str) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
@@ -78,20 +95,22 @@ def read_block(text: str) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]
         BlockError: If the text is damaged.
     """
     try:
-        data = zlib.decompress(base64.b64decode(text, validate=True))
-        entrytext, _, body = data.partition(b"\n")
-        head = json.loads(entrytext)
-    except (binascii.Error, zlib.error, ValueError) as error:
+        first, _, body = from_text(text).partition(b"\n")
+        head = from_json(_Head, parsed(first.decode(), "the block's head"), "the block's head")
+    except ValueError as error:
         raise BlockError(f"the block is damaged: {error}") from error
+    spoken_of = _PLANES * sum(column.count for column in head.columns)
+    if spoken_of != len(body):
+        raise BlockError(
+            f"the block is damaged: it holds {len(body)} B of numbers, its head speaks of "
+            f"{spoken_of}"
+        )
     columns, at = {}, 0
-    for column in head["columns"]:
-        end = at + _PLANES * column["count"]
-        whole = _numbers(body[at:end], column["count"], column.get("differences", 2))
-        columns[column["name"]] = whole * column["step"]
+    for column in head.columns:
+        end = at + _PLANES * column.count
+        columns[column.name] = _numbers(body[at:end], column.differences) * column.step
         at = end
-    if at != len(body):
-        raise BlockError(f"the block holds {len(body)} B of numbers, its head speaks of {at}")
-    return head["meta"], columns
+    return head.meta, columns
 
 
 def _whole(name: str, column: Column) -> NDArray[np.int64]:
@@ -105,15 +124,11 @@ def _whole(name: str, column: Column) -> NDArray[np.int64]:
 
 def _planes(whole: NDArray[np.int64], differences: int) -> bytes:
     bent = np.diff(whole, n=differences, prepend=(0,) * differences)
-    folded = ((bent << 1) ^ (bent >> 63)).astype("<u4")
-    return folded.view(np.uint8).reshape(-1, _PLANES).T.tobytes()
+    return to_planes(((bent << 1) ^ (bent >> 63)).astype(_FOLDED))
 
 
-def _numbers(data: bytes, count: int, differences: int) -> NDArray[np.float64]:
-    planes = np.frombuffer(data, np.uint8)
-    if planes.size != _PLANES * count:
-        raise BlockError("the block is cut short")
-    folded = np.ascontiguousarray(planes.reshape(_PLANES, count).T).view("<u4")[:, 0]
+def _numbers(data: bytes, differences: int) -> NDArray[np.float64]:
+    folded = from_planes(data, _FOLDED)
     bent = (folded >> 1).astype(np.int64) ^ -(folded & 1).astype(np.int64)
     for _ in range(differences):
         bent = np.cumsum(bent)

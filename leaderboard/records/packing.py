@@ -1,20 +1,13 @@
-"""Arrays as short text, without loss, so that a record can hold every control of a route.
-
-Bytes are put by significance (all first bytes, then all second ones, …), which lets zlib find what
-neighbouring numbers share, then deflated, then written in base 64. Little-endian on every machine.
-"""
+"""Arrays as short text, without loss, so that a record can hold every control of a route."""
 
 from __future__ import annotations
 
-import base64
-import binascii
-import zlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-_LARGEST_BYTES = 1 << 28  # nothing of ours is longer; text that would unpack to more is refused
+from di_envs.files.planes import from_planes, from_text, to_planes, to_text
 
 
 def pack(array: NDArray[Any], dtype: str) -> str:
@@ -30,8 +23,7 @@ def pack(array: NDArray[Any], dtype: str) -> str:
     exact = np.ascontiguousarray(array, dtype=dtype)
     if not np.array_equal(exact, array, equal_nan=exact.dtype.kind == "f"):
         raise ValueError(f"an array of {array.dtype} cannot be packed as {dtype} without loss")
-    planes = exact.view(np.uint8).reshape(-1, exact.dtype.itemsize).T
-    return base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return to_text(to_planes(exact))
 
 
 def unpack(text: str, dtype: str, columns: int) -> NDArray[Any]:
@@ -40,13 +32,9 @@ def unpack(text: str, dtype: str, columns: int) -> NDArray[Any]:
     Raises:
         ValueError: If the text is damaged, or does not fill whole rows.
     """
-    size = np.dtype(dtype).itemsize
-    try:
-        inflate = zlib.decompressobj()
-        data = inflate.decompress(base64.b64decode(text, validate=True), _LARGEST_BYTES)
-    except (binascii.Error, zlib.error) as error:
-        raise ValueError(f"packed numbers are damaged ({error})") from error
-    if not inflate.eof or inflate.unused_data or len(data) % (size * columns):
-        raise ValueError(f"packed numbers are damaged: no whole rows of {columns} in {len(data)} B")
-    planes = np.frombuffer(data, np.uint8).reshape(size, -1)
-    return np.ascontiguousarray(planes.T).view(dtype).reshape(-1, columns)
+    numbers = from_planes(from_text(text), dtype)
+    if len(numbers) % columns:
+        raise ValueError(
+            f"packed numbers are damaged: no whole rows of {columns} in {len(numbers)}"
+        )
+    return numbers.reshape(-1, columns)

@@ -154,10 +154,11 @@ class RunRecord:
     """A run of one agent over routes and seeds, finished or not.
 
     Attributes:
-        agent_hash: Of the code, and of the files, that the agent's name leads to.
+        agent_version: Tells the agent from others of its name; see `agents.versions`.
         suite_version: 0 for routes of the user's own.
         options: Environment options that differ from the defaults.
-        versions: Package name to version, for all that can change bits.
+        versions: Package name to version, for all that can change bits; `world` is our own
+            `WORLD_VERSION`. Python's and ours are there for information.
         cpu: CPU capability that the kernels were compiled for.
         routes_hash: Of the ids and points of all routes that the run is over.
         planned: Number of (route, seed) pairs that were asked for.
@@ -167,7 +168,7 @@ class RunRecord:
 
     rules: str
     agent: str
-    agent_hash: str
+    agent_version: str
     track: str
     requires: Mapping[str, Any]
     suite: str

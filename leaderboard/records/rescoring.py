@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
+from di_envs.rules import Rules
 from di_envs.world.kinds import EventKind
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.scoring.rules import Rules
 from leaderboard.scoring.score import Progress, score_route
 
 

@@ -13,14 +13,21 @@ hash of the run's file, so routes of two runs are never counted together.
 from __future__ import annotations
 
 import dataclasses
-import json
-import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from di_envs.files.json_values import (
+    ForeignError,
+    JsonError,
+    by_lines,
+    compact,
+    indented,
+    read_document,
+)
+from di_envs.files.whole import write_whole
 from leaderboard.records.carla.results import carla_results
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.run_json import (
@@ -117,7 +124,7 @@ def start_run(folder: Path, run: RunRecord) -> None:
     Raises:
         ResultsError: If the folder cannot be written to.
     """
-    _write(folder, lambda: _write_json(folder / RECORD_FILE, run_to_json(run)))
+    _write(folder, lambda: write_whole(folder / RECORD_FILE, indented(run_to_json(run))))
     write_table(folder, run)
 
 
@@ -142,7 +149,7 @@ def write_table(folder: Path, run: RunRecord) -> None:
     Raises:
         ResultsError: If the folder cannot be written to.
     """
-    _write(folder, lambda: _write_json(folder / CARLA_FILE, carla_results(run)))
+    _write(folder, lambda: write_whole(folder / CARLA_FILE, indented(carla_results(run))))
 
 
 def _write(folder: Path, write: Callable[[], None]) -> None:
@@ -153,40 +160,14 @@ def _write(folder: Path, write: Callable[[], None]) -> None:
 
 
 def _write_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
-    routes = folder / ROUTES_FOLDER
-    routes.mkdir(exist_ok=True)
     content = {
         "format": ROUTE_FORMAT,
         "format_version": FORMAT_VERSION,
         "run": run_hash(run),
         **route_to_json(record),
     }
-    lines = (f" {json.dumps(key)}: {_compact(value)}" for key, value in content.items())
-    replace_file(routes / f"{record.index:04d}.json", "{\n" + ",\n".join(lines) + "\n}\n")
-
-
-def _compact(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))
-
-
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    replace_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
-
-
-def replace_file(path: Path, text: str) -> None:
-    """Writes beside the file, then renames: the file is the old or the new one, never half."""
-    with tempfile.NamedTemporaryFile(
-        "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
-    ) as file:
-        try:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-            os.chmod(file.name, 0o644)  # temporary files are private, results are not
-            os.replace(file.name, path)
-        except BaseException:
-            os.unlink(file.name)
-            raise
+    text = by_lines({name: compact(value) for name, value in content.items()})
+    write_whole(folder / ROUTES_FOLDER / f"{record.index:04d}.json", text)
 
 
 def run_folder(path: Path) -> Path:
@@ -226,7 +207,8 @@ def read_head(folder: Path) -> RunRecord:
     Raises:
         ResultsError: As `read_run`.
     """
-    return _parsed(folder / RECORD_FILE, FORMAT, run_from_json)
+    path = folder / RECORD_FILE
+    return _sound(lambda: run_from_json(read_document(path, FORMAT, FORMAT_VERSION), str(path)))
 
 
 def read_route(file: Path, run: RunRecord) -> RouteRecord:
@@ -236,54 +218,28 @@ def read_route(file: Path, run: RunRecord) -> RouteRecord:
         DamagedError: If the file is cut short or garbled.
         ResultsError: If it is foreign, of another format version, or of another run.
     """
-    content = _content(file, ROUTE_FORMAT)
-    if content.get("run") != run_hash(run):
+    content = _sound(lambda: read_document(file, ROUTE_FORMAT, FORMAT_VERSION))
+    if content.pop("run", None) != run_hash(run):
         raise ResultsError(
             f"{file} belongs to another run than the {RECORD_FILE} beside it: put the file of its "
             "own run there, or remove it and continue with `driveinsight evaluate --resume`"
         )
-    record = _parse(file, content, route_from_json)
+    record = _sound(lambda: route_from_json(content, str(file)))
     if file.stem != f"{record.index:04d}" or record.index >= run.planned:
         raise ResultsError(f"{file} holds route number {record.index}: it was renamed")
     return record
 
 
-def _parsed(path: Path, form: str, parse: Callable[[Mapping[str, Any]], _Value]) -> _Value:
-    return _parse(path, _content(path, form), parse)
-
-
-def _content(path: Path, form: str) -> Mapping[str, Any]:
-    """The JSON object in a file of ours, whose format and version are right."""
+def _sound(read: Callable[[], _Value]) -> _Value:
+    """What is read of a file of ours; else an error that says what to do."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_number)
-    except (ValueError, OSError) as error:
-        raise DamagedError(
-            f"{path} is not whole JSON ({error}): fetch it again from where it came, or remove it "
-            "and evaluate again"
+        return read()
+    except ForeignError as error:
+        raise ResultsError(
+            f"{error}: give the folder that `driveinsight evaluate --output` wrote, or read it "
+            "with the version that wrote it"
         ) from error
-    if not isinstance(content, dict) or content.get("format") != form:
-        raise ResultsError(
-            f"{path} is not a {path.name} of ours (its format is not '{form}'): "
-            "give the folder that `driveinsight evaluate --output` wrote"
-        )
-    if content.get("format_version") != FORMAT_VERSION:
-        raise ResultsError(
-            f"{path} has format version {content.get('format_version')}, this program reads "
-            f"{FORMAT_VERSION}: evaluate again, or read it with the version that wrote it"
-        )
-    return content
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number of JSON")
-
-
-def _parse(
-    path: Path, content: Mapping[str, Any], parse: Callable[[Mapping[str, Any]], _Value]
-) -> _Value:
-    try:
-        return parse(content)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except JsonError as error:
         raise DamagedError(
-            f"{path} lacks or garbles a field ({error!r}): evaluate again"
+            f"{error}: fetch it again from where it came, or remove it and evaluate again"
         ) from error

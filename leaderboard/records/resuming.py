@@ -7,12 +7,11 @@ earlier process stand beside new ones exactly if all of these are equal.
 from __future__ import annotations
 
 import dataclasses
-import json
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from leaderboard.records.footing import record_differences
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import (
     RECORD_FILE,
@@ -22,16 +21,9 @@ from leaderboard.records.results import (
     read_route,
     route_files,
 )
-from leaderboard.records.run_json import run_from_json, run_to_json
 
-_NAMES = {
-    "agent_hash": "the hash of the agent's code",
-    "cpu": "the CPU's capability",
-    "planned": "the number of routes x seeds",
-    "requires": "what the agent requires",
-    "routes_hash": "the hash of the routes",
-    "town_hash": "the hash of the town's map",
-}
+# Of a run all is asked for or found out before it drives, but for the routes that it has driven
+_ASKED = tuple(part.name for part in dataclasses.fields(RunRecord) if part.name != "routes")
 
 
 def resumed(folder: Path, run: RunRecord) -> RunRecord:
@@ -45,14 +37,14 @@ def resumed(folder: Path, run: RunRecord) -> RunRecord:
         ResultsError: If the folder holds another run, or one driven on another footing; the
             message says what differs.
     """
-    written = run_from_json(json.loads(json.dumps(run_to_json(run))))  # as its file would read
-    differences = list(_differences(_earlier(folder) or written, written))
-    if differences:
+    found = record_differences(_earlier(folder) or run, run, _ASKED)
+    if found:
+        said = "; ".join(difference.was_is for difference in found)
         raise ResultsError(
-            f"{folder} cannot be resumed, its results would mix: {'; '.join(differences)}. Repeat "
-            "the command as it was, or choose another --output"
+            f"{folder} cannot be resumed, its results would mix: {said}. Repeat the command as it "
+            "was, or choose another --output"
         )
-    return dataclasses.replace(run, routes=tuple(_kept(folder, written)))
+    return dataclasses.replace(run, routes=tuple(_kept(folder, run)))
 
 
 def _earlier(folder: Path) -> RunRecord | None:
@@ -76,27 +68,3 @@ def _kept(folder: Path, run: RunRecord) -> Iterator[RouteRecord]:
             continue
         if not record.lost:
             yield record
-
-
-def _differences(earlier: RunRecord, now: RunRecord) -> Iterator[str]:
-    """What is not as it was, each as `seeds was 0, 1, is 0`."""
-    for field in dataclasses.fields(RunRecord):
-        if field.name == "routes":
-            continue
-        old, new = getattr(earlier, field.name), getattr(now, field.name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            for key in sorted(old.keys() | new.keys()):
-                if old.get(key) != new.get(key):
-                    yield _was(f"{field.name} '{key}'", old.get(key), new.get(key))
-        elif old != new:
-            yield _was(_NAMES.get(field.name, field.name), old, new)
-
-
-def _was(name: str, old: Any, new: Any) -> str:
-    return f"{name} was {_text(old)}, is {_text(new)}"
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return "not given"
-    return ", ".join(map(str, value)) or "none" if isinstance(value, tuple | list) else str(value)

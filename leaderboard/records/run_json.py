@@ -2,102 +2,86 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any
 
-from di_envs.world.kinds import EventKind
-from leaderboard.records.record import Bound, EventRecord, RouteRecord, RunRecord
-from leaderboard.scoring.score import Score
+from di_envs.files.json_values import JsonError, from_json, to_json
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.versions import INFORMATION
 
 FORMAT = "driveinsight-run"
 ROUTE_FORMAT = "driveinsight-route"
-FORMAT_VERSION = 2
-
-# Annotations that a JSON value can be held against
-_TYPES: Mapping[str, tuple[type, ...]] = {"int": (int,), "float": (int, float), "str": (str,)}
-
-_Record = TypeVar("_Record")
+FORMAT_VERSION = 3
 
 
 def run_hash(run: RunRecord) -> str:
-    """What a run's routes call it by: a hash of everything but the routes."""
-    text = json.dumps(run_to_json(run), sort_keys=True)
+    """What a run's routes call it by: a hash of all but the routes, and what is information only.
+
+    So a run that goes on under another Python stays that run.
+    """
+    content = run_to_json(run)
+    for name in INFORMATION:
+        content["versions"].pop(name, None)
+    text = json.dumps(content, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def run_to_json(run: RunRecord) -> dict[str, Any]:
     """The run as JSON values, without its routes."""
-    fields = {field.name: getattr(run, field.name) for field in dataclasses.fields(run)}
+    fields = to_json(run)
     del fields["routes"]
-    if run.interventions:  # left out where there are none, as in files from before there were any
-        fields["interventions"] = list(run.interventions)
-    else:
+    if not run.interventions:  # left out, as in files from before there were any
         del fields["interventions"]
-    fields["seeds"] = list(run.seeds)
-    fields["requires"] = dict(run.requires)
-    fields["options"] = dict(run.options)
-    fields["versions"] = dict(run.versions)
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **fields}
 
 
-def run_from_json(content: Mapping[str, Any]) -> RunRecord:
+def run_from_json(content: Mapping[str, Any], source: str = "run") -> RunRecord:
     """The inverse of `run_to_json`: a run without routes.
 
+    Args:
+        content: JSON values, with or without the format and its version.
+        source: What errors call the file.
+
     Raises:
-        KeyError: If a field is missing.
-        TypeError: If one is of another type.
+        JsonError: If a field is missing, unknown or of another type.
     """
-    names = [field.name for field in dataclasses.fields(RunRecord) if field.name != "routes"]
-    names.remove("interventions")
-    values = {name: content[name] for name in names}
-    values["interventions"] = tuple(content.get("interventions", ()))
-    values["seeds"] = tuple(values["seeds"])
-    return _checked(RunRecord, values)
+    values: dict[str, Any] = {"interventions": [], "routes": []}
+    for name, value in content.items():
+        if name == "routes":
+            raise JsonError(f"{source}: unknown field 'routes'; each has a file of its own")
+        if name not in ("format", "format_version"):
+            values[name] = value
+    return from_json(RunRecord, values, source, complete=True)
 
 
 def route_to_json(record: RouteRecord) -> dict[str, Any]:
     """The route as JSON values."""
-    values = dataclasses.asdict(record)
+    values: dict[str, Any] = to_json(record)
     values["score"]["driving_score"] = record.score.driving_score
-    values["events"] = [
-        {**event, "kind": EventKind(event["kind"]).name.lower()} for event in values["events"]
-    ]
     return values
 
 
-def route_from_json(content: Mapping[str, Any]) -> RouteRecord:
+def route_from_json(content: Mapping[str, Any], source: str = "route") -> RouteRecord:
     """The inverse of `route_to_json`.
 
+    Args:
+        content: JSON values.
+        source: What errors call the file.
+
     Raises:
-        KeyError: If a field is missing.
-        TypeError: If one is of another type.
-        ValueError: If the driving score is not the product of the others.
+        JsonError: If a field is missing, unknown or of another type, or if the driving score is not
+            the product of the others.
     """
-    values = {field.name: content[field.name] for field in dataclasses.fields(RouteRecord)}
-    score, bound = dict(values["score"]), values["bound"]
-    driving_score = score.pop("driving_score")
-    values["score"] = kept = _checked(Score, score)
-    if driving_score != kept.driving_score:
-        raise ValueError(f"driving_score {driving_score} is not the product of the others")
-    if bound is not None:
-        values["bound"] = _checked(Bound, bound)
-    values["events"] = tuple(
-        _checked(EventRecord, {**event, "kind": EventKind[event["kind"].upper()]})
-        for event in values["events"]
-    )
-    values["interventions"] = tuple(values["interventions"])
-    values["trace"] = tuple(tuple(row) for row in values["trace"])
-    return _checked(RouteRecord, values)
-
-
-def _checked(record: type[_Record], values: Mapping[str, Any]) -> _Record:
-    """The record of these values, its numbers and texts being such."""
-    for field in dataclasses.fields(record):  # type: ignore[arg-type]
-        expected = _TYPES.get(str(field.type))
-        value = values.get(field.name, field.default)
-        if expected and (not isinstance(value, expected) or isinstance(value, bool)):
-            raise TypeError(f"{field.name} must be of type {field.type}, not {value!r}")
-    return record(**values)
+    values, given = dict(content), None
+    if isinstance(score := values.get("score"), Mapping):
+        values["score"] = {name: part for name, part in score.items() if name != "driving_score"}
+        given = score.get("driving_score")
+    record = from_json(RouteRecord, values, source, complete=True)
+    product = record.score.driving_score
+    if given != product or isinstance(given, bool):
+        raise JsonError(
+            f"{source}: score.driving_score: {given!r} is not the product of the others, {product}"
+        )
+    return record

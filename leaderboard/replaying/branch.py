@@ -8,24 +8,26 @@ episode was, to the bit, or not at all. Then the world is edited, and the agent 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium
-import numpy as np
-
-from di_envs.edits.text import EditError
+from agents.base import Agent
 from di_envs.edits.world import WorldEdit
 from di_envs.route_env import RouteEnv
-from leaderboard.records.episode_hash import observation_check
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.replaying.replay import replay_env, sensor_options
-from leaderboard.replaying.timed_edits import EditPlan, TimedEdit, decisions_before, timed_edits
-from leaderboard.running.episode import drive_route
-from leaderboard.running.interventions import sort_interventions
+from leaderboard.replaying.going_on import AgentThen, GoingOn
+from leaderboard.replaying.recorded_agent import RetraceError, run_agent
+from leaderboard.replaying.replay import logged, replay_env, sensor_options
+from leaderboard.replaying.retracing import Decision, retrace
+from leaderboard.replaying.timed_edits import TimedEdit, decisions_before
+from leaderboard.running.episode import close_agent
+from leaderboard.running.finished_route import route_record
 from leaderboard.running.jobs import Job
-from leaderboard.scoring.rules import rules_named
+from leaderboard.running.log import EpisodeLog
 
 
 class BranchError(Exception):
@@ -71,32 +73,65 @@ def branch(
         EditError: If an edit cannot be made at that moment, or the record's cannot be read.
         ReplayError: If the run's environment cannot be made here.
     """
-    own = timed_edits(record.interventions)
-    if own:
-        edits_made = "; ".join(map(str, own))
-        raise BranchError(f"the recorded world was edited already ({edits_made})")
-    env = replay_env(run, **sensor_options(run))
-    decisions = decisions_before(at_s, env.config.control_dt_s)
+    started_s = time.perf_counter()
+    with ExitStack() as at_last:
+        env = replay_env(run, **sensor_options(run))
+        at_last.callback(env.close)
+        decisions = _decisions(record, at_s, env.config.control_dt_s)
+        try:
+            agent = run_agent(run, env)
+            at_last.callback(close_agent, agent)
+            log, fork = _driven_to(decisions, run, record, agent, env, on_step)
+        except RetraceError as error:
+            raise BranchError(str(error)) from error
+        then = AgentThen(agent=agent, memory=fork.memory, eyes=fork.eyes)
+        going = GoingOn(env, record, fork.step, then, edits)
+        log = logged(log, going.now.step, going.now.shown)
+        while going.decides():
+            log = logged(log, going.now.step, going.now.shown)
+            on_step(going.now.time_s)
+        timed = (str(TimedEdit(edit=edit, time_s=at_s)) for edit in edits)
+        edited = route_record(
+            env.view,
+            Job(index=0, route_id=record.route_id, seed=record.seed),
+            rules_named(run.rules),
+            log,
+            fault=going.fault,
+            interventions=(*record.interventions, *timed),
+            wall_s=time.perf_counter() - started_s,
+        )
+    return Branch(at_s=at_s, edits=tuple(edits), recorded=record, edited=edited)
+
+
+def _decisions(record: RouteRecord, at_s: float, control_dt_s: float) -> int:
+    """How many decisions come before the moment."""
+    decisions = decisions_before(at_s, control_dt_s)
     if not 0 <= decisions < record.steps:
-        last_s = max(record.steps - 1, 0) * env.config.control_dt_s
+        last_s = max(record.steps - 1, 0) * control_dt_s
         raise BranchError(
             f"route {record.route_id}, seed {record.seed} was driven to {record.game_s:g} s: "
             f"branch it between 0 and {last_s:g} s, not at {at_s:g} s"
         )
-    timed = [TimedEdit(edit=edit, time_s=at_s) for edit in edits]
-    seen = sort_interventions(record.interventions, env.observation_space)
-    branching = Branching(seen.around(env), record, decisions, timed, on_step)
-    edited = drive_route(
-        branching,
-        lambda: seen.agent(run.agent),
-        Job(index=0, route_id=record.route_id, seed=record.seed),
-        rules_named(run.rules),
-        interventions=(*record.interventions, *map(str, timed)),
-    )
-    env.close()
-    if branching.refused is not None:
-        raise branching.refused
-    return Branch(at_s=at_s, edits=tuple(edits), recorded=record, edited=edited)
+    return decisions
+
+
+def _driven_to(
+    decisions: int,
+    run: RunRecord,
+    record: RouteRecord,
+    agent: Agent[Any],
+    env: RouteEnv,
+    on_step: Callable[[float], None],
+) -> tuple[EpisodeLog | None, Decision]:
+    """The log of the moments before the one after so many decisions, and that moment."""
+    log: EpisodeLog | None = None
+    with closing(retrace(run, record, agent=agent, env=env)) as retraced:
+        for decision in retraced:
+            on_step(decision.time_s)
+            if decision.number == decisions:
+                return log, decision
+            log = logged(log, decision.step, decision.shown)
+    raise AssertionError("a record has as many moments as it has decisions, and one more")
 
 
 def branch_run(run: RunRecord, branch: Branch) -> RunRecord:
@@ -113,68 +148,3 @@ def same_future(one: RouteRecord, other: RouteRecord) -> bool:
         dataclasses.replace(one, index=0).fingerprint()
         == dataclasses.replace(other, index=0).fingerprint()
     )
-
-
-class Branching(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Compares with the record up to a moment, then edits the world, then stands aside.
-
-    Attributes:
-        refused: Why the branch does not begin; None while all is well.
-    """
-
-    def __init__(
-        self,
-        env: gymnasium.Env[Any, Any],
-        record: RouteRecord,
-        decisions: int,
-        edits: Sequence[TimedEdit],
-        on_step: Callable[[float], None],
-    ) -> None:
-        super().__init__(env)
-        self._route_env: RouteEnv = env.unwrapped  # type: ignore[assignment]
-        self._decisions, self._on_step = decisions, on_step
-        self._plan = EditPlan(edits, self._route_env.config.control_dt_s)
-        self._controls, self._checks = record.control_array(), record.check_array()
-        self._done = 0
-        self.refused: BranchError | EditError | None = None
-
-    def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
-        """Resets the environment; edits the world if the branch begins at once."""
-        observation, info = self.env.reset(**arguments)
-        self._done = 0
-        return self._looked_at(observation), info
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Steps the environment; edits the world where the branch begins."""
-        if self._done < self._decisions:
-            self._compare("acts", np.array_equal(self._controls[self._done], action))
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self._done += 1
-        self._on_step(info["game_time_s"])
-        return self._looked_at(observation), reward, terminated, truncated, info
-
-    def _looked_at(self, observation: Mapping[str, Any]) -> Mapping[str, Any]:
-        """What the agent is shown: after the edits, where they are due."""
-        if self._done <= self._decisions:
-            check = int(self._checks[self._done])
-            self._compare("sees", check == observation_check(observation))
-        try:
-            edited = self._plan.apply(self._route_env, self._done)
-        except EditError as error:
-            self._refuse(error)
-        return self.env.get_wrapper_attr("observe")() if edited else observation
-
-    def _compare(self, what: str, equal: bool) -> None:
-        if not equal:
-            time_s = self._done * self._route_env.config.control_dt_s
-            self._refuse(
-                BranchError(
-                    f"at {time_s:g} s the agent {what} otherwise than recorded: it, its weights, "
-                    f"the package versions or the CPU are not those of the run"
-                )
-            )
-
-    def _refuse(self, error: BranchError | EditError) -> None:
-        """Ends the drive: `drive_route` takes any exception for a crash, so it is kept here."""
-        self.refused = error
-        raise error

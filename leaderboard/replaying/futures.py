@@ -1,42 +1,35 @@
-"""How a drive goes on from a moment, with or without an edit: futures that begin at the same state.
+"""Futures of a moment of a recorded drive: what is to be seen of each, for so many decisions.
 
-The environment is put back to where it was, and the agent has the memory that it had, to the bit;
-so what differs between two futures does so because of the edit. An agent that hides its memory
-drives the recorded part again for each of them.
+One is the recorded one, taken from the drive as it is retraced; the others are driven on from the
+same state (`going_on.py`). Both are gathered in the same way, so they can be laid side by side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base import Agent, Control, Observation
-from di_envs.edits.world import apply_world_edits
+from agents.base import Control, Observation
+from di_envs.edits.world import WorldEdit
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from di_envs.saving import EnvSnapshot, restore
-from di_envs.world.state import TICK_S
 from leaderboard.records.episode_hash import observation_check
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.replaying.film import Film, film_every
-from leaderboard.replaying.replay import ReplayStep
-from leaderboard.replaying.retracing import Decision, Eyes, retrace
-from leaderboard.replaying.timed_edits import EditPlan, timed_edits
-from leaderboard.replaying.what_if import Question
-from leaderboard.running.episode import control_error, describe, extra_keys
+from leaderboard.replaying.going_on import AgentThen, GoingOn
+from leaderboard.replaying.retracing import Decision
 from leaderboard.running.log import event_record
-from leaderboard.scoring.rules import rules_named
-from wrappers.interventions.context import context_of
 
 AHEAD_S = 15.0  # how far futures are driven, unless somebody says
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
-    """From where futures begin.
+class Fork:
+    """The moment from which futures begin.
 
     Attributes:
         run: The run.
@@ -49,21 +42,6 @@ class Moment:
     record: RouteRecord
     decision: Decision
     snapshot: EnvSnapshot
-
-
-@dataclass(frozen=True, kw_only=True)
-class Driver:
-    """Who drives on.
-
-    Attributes:
-        agent: The agent.
-        memory: What it remembered at the moment.
-        eyes: With which it looks then.
-    """
-
-    agent: Agent[Any]
-    memory: Any
-    eyes: Eyes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,11 +73,56 @@ class Future:
     problem: str = ""
 
 
+class FutureSoFar:
+    """Gathers a future, moment by moment.
+
+    Args:
+        first: The moment at which it begins.
+        control_dt_s: Time from one decision to the next.
+    """
+
+    def __init__(self, first: Decision, control_dt_s: float) -> None:
+        self._first = self._last = first
+        self._every = film_every(control_dt_s)
+        self._film = Film()
+        self._film.add(first.step)
+        self._controls: list[Control] = []
+        self._checks = [observation_check(first.shown)]
+        self.events: list[EventRecord] = []
+
+    def add(self, decision: Decision, *, last: bool = False) -> None:
+        """Takes up the next moment; the last one of a drive is always filmed."""
+        step = decision.step
+        assert step.control is not None
+        if decision.number % self._every == 0 or last:
+            self._film.add(step)
+        self._controls.append(step.control)
+        self._checks.append(observation_check(decision.shown))
+        self.events += [event_record(event, step.view) for event in step.events]
+        self._last = decision
+
+    def future(self, status: str, problem: str) -> Future:
+        """What has become of it."""
+        last = self._last.step
+        return Future(
+            seen=self._first.seen,
+            film=self._film,
+            controls=np.array(self._controls, np.float32).reshape(-1, 3),
+            checks=np.array(self._checks, np.uint32),
+            events=tuple(self.events),
+            end_s=last.time_s,
+            status=status,
+            driving_score=float(last.info["driving_score"]),
+            route_completion=float(last.info["route_completion"]),
+            problem=problem,
+        )
+
+
 def drive_on(
     env: RouteEnv,
-    moment: Moment,
-    driver: Driver,
-    question: Question | None = None,
+    fork: Fork,
+    then: AgentThen,
+    edits: Sequence[WorldEdit] = (),
     *,
     decisions: int,
     on_step: Callable[[], None] = lambda: None,
@@ -108,137 +131,30 @@ def drive_on(
 
     Args:
         env: The environment that the moment is of, or a twin; it is left somewhere in the future.
-        moment: The moment.
-        driver: Who drives on, as the question wants it; see `driver_for`.
-        question: What is edited of the world; None for nothing.
+        fork: The moment.
+        then: Who drives on.
+        edits: What is edited of the world.
         decisions: At most so many.
         on_step: Called after every decision.
 
     Raises:
         EditError: If the world cannot be edited so at that moment.
     """
-    restore(env, moment.snapshot)
-    if question is not None and question.world is not None:
-        apply_world_edits(env, (question.world,))
-    going = _Going(env, moment, driver)
-    last = moment.decision.number + decisions
-    while going.number < last and going.decides():
+    restore(env, fork.snapshot)
+    going = GoingOn(env, fork.record, fork.decision.step, then, edits)
+    so_far = FutureSoFar(going.now, env.config.control_dt_s)
+    for _ in range(decisions):
+        if not going.decides():
+            break
+        so_far.add(going.now, last=going.now.step.over)
         on_step()
-    return going.future()
+    status = _status(fork, so_far.events) if going.now.step.over else ""
+    return so_far.future(status, going.fault[1])
 
 
-def driver_for(
-    question: Question,
-    moment: Moment,
-    env: RouteEnv,
-    agent: Agent[Any],
-    eyes: Eyes,
-) -> Driver:
-    """Who drives on with an edit: the agent itself, where it can, or one like it.
-
-    Args:
-        question: The edit.
-        moment: The moment.
-        env: The environment that it is of, or a twin.
-        agent: That retraces the drive.
-        eyes: That have looked at the drive so far, behind the edit.
-
-    Returns:
-        The driver; its agent is to be closed by the caller if it is another one.
-    """
-    if not agent.requires.branchable:
-        other = question.interventions.agent(moment.run.agent)
-        return Driver(agent=other, memory=_memory_of(other, moment, env), eyes=eyes)
-    if question.within:
-        agent = question.interventions.agent(moment.run.agent)
-    return Driver(agent=agent, memory=moment.decision.memory, eyes=eyes)
-
-
-def _memory_of(agent: Agent[Any], moment: Moment, env: RouteEnv) -> Any:
-    """The memory of an agent that hides it, once it has driven to the moment itself."""
-    decisions = retrace(moment.run, moment.record, agent=agent, env=env.twin())
-    return next(d.memory for d in decisions if d.number == moment.decision.number)
-
-
-class _Going:
-    """A future while it is driven."""
-
-    def __init__(self, env: RouteEnv, moment: Moment, driver: Driver) -> None:
-        self._env, self._moment = env, moment
-        self._agent, self._memory, self._eyes = driver.agent, driver.memory, driver.eyes
-        plan = timed_edits(moment.record.interventions)
-        self._later = EditPlan(plan, env.config.control_dt_s)
-        self._every = film_every(env.config.control_dt_s)
-        self._film = Film()
-        self._controls: list[Control] = []
-        self._checks: list[int] = []
-        self._events: list[EventRecord] = []
-        self._problem = ""
-        step = moment.decision.step
-        self.number, self._over = step.decision, step.over
-        self._info: Mapping[str, Any] = step.info
-        self._seen = self.first = self._look(env.observe(), step.control)
-
-    def decides(self) -> bool:
-        """One decision, and what it leads to; False where there is none to make."""
-        if self._over:
-            return False
-        try:
-            control, memory = self._agent.act(self._seen, self._memory)
-        except (Exception, SystemExit) as error:
-            self._problem = describe(error)
-            return False
-        control = np.asarray(control, np.float32)
-        self._problem = control_error(control)
-        if self._problem:
-            return False
-        self._memory = memory
-        observation, _, terminated, truncated, self._info = self._env.step(control)
-        self._over = terminated or truncated
-        self.number += 1
-        if self._later.apply(self._env, self.number):  # what was done to the recorded world too
-            observation = self._env.observe()
-        self._controls.append(control)
-        self._events += [event_record(event, self._env.view) for event in self._info["events"]]
-        self._seen = self._look(observation, control)
-        return True
-
-    def _look(self, observation: Mapping[str, Any], control: Control | None) -> Observation:
-        """What the agent is handed; films the moment."""
-        context = context_of(self._info, self._env.config.control_dt_s)
-        shown, self._eyes = self._eyes.look(observation, context)
-        self._checks.append(observation_check(shown))
-        if not self._controls or self.number % self._every == 0 or self._over:
-            self._film.add(
-                ReplayStep(
-                    decision=self.number,
-                    time_s=self._info["game_time_s"],
-                    control=control,
-                    observation=observation,
-                    view=self._env.view,
-                    events=self._info["events"],
-                    reward=0.0,
-                    info=self._info,
-                    over=self._over,
-                )
-            )
-        return {**shown, **extra_keys(self._agent.requires, self._env.view)}
-
-    def future(self) -> Future:
-        """What has become of it."""
-        run, record = self._moment.run, self._moment.record
-        now_s = self._moment.decision.time_s
-        before = [event.kind for event in record.events if event.time_s <= now_s]
-        kinds = [*before, *(event.kind for event in self._events)]
-        return Future(
-            seen=self.first,
-            film=self._film,
-            controls=np.array(self._controls, np.float32).reshape(-1, 3),
-            checks=np.array(self._checks, np.uint32),
-            events=tuple(self._events),
-            end_s=round(int(self._env.view.state.tick) * TICK_S, 6),
-            status=rules_named(run.rules).status(kinds) if self._over else "",
-            driving_score=float(self._info["driving_score"]),
-            route_completion=float(self._info["route_completion"]),
-            problem=self._problem,
-        )
+def _status(fork: Fork, events: Sequence[EventRecord]) -> str:
+    """How the route ended, by the rules."""
+    now_s = fork.decision.time_s
+    before = [event.kind for event in fork.record.events if event.time_s <= now_s]
+    rules = rules_named(fork.run.rules)
+    return rules.status([*before, *(event.kind for event in events)])

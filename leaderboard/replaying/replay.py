@@ -21,9 +21,11 @@ from di_envs.sensors.lidar.config import LidarConfig
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event, WorldView
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.replaying.timed_edits import EditPlan, decisions_before, timed_edits
+from leaderboard.replaying.recorded_edits import timed_edits
+from leaderboard.replaying.timed_edits import EditPlan, decisions_before
+from leaderboard.running.finished_route import route_hash
 from leaderboard.running.jobs import Job
-from leaderboard.running.log import route_hash
+from leaderboard.running.log import EpisodeLog
 
 CHEAPEST = ("inertial",)  # the group of observations that costs least
 _SENSOR_OPTIONS = ("observations", "cameras", "lidar")
@@ -172,6 +174,22 @@ def replay(
             raise ReplayError(
                 f"the route ends after {decision} decisions, the record goes on to {len(controls)}"
             )
+
+
+def logged(log: EpisodeLog | None, step: ReplayStep, shown: Mapping[str, Any]) -> EpisodeLog:
+    """The log of a drive with one more moment.
+
+    Args:
+        log: Of the moments before; None at the first one.
+        step: The moment.
+        shown: What the agent was shown then.
+    """
+    if log is None:
+        log = EpisodeLog(step.view)
+    elif step.control is not None:
+        log.add_step(step.control, step.reward, step.events)
+    log.hashes.add_observation(shown)
+    return log
 
 
 def replay_to(

@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from di_envs.edits.text import EditError, EditText, read_edit
-from di_envs.edits.world import WORLD_EDITS, WorldEdit, apply_world_edits, world_edit
+from di_envs.edits.world import WorldEdit, apply_world_edits
 from di_envs.route_env import RouteEnv
 
 
@@ -24,27 +23,6 @@ class TimedEdit:
 
     def __str__(self) -> str:
         return str(replace(self.edit.to_text(), when=f"t={self.time_s!r}"))
-
-
-def timed_edits(interventions: Iterable[str]) -> tuple[TimedEdit, ...]:
-    """Those of a record's interventions that change the world.
-
-    Raises:
-        EditError: If one of them cannot be read.
-    """
-    texts = [read_edit(text) for text in interventions]
-    return tuple(_timed(text) for text in texts if f"{text.verb}:{text.target}" in WORLD_EDITS)
-
-
-def _timed(text: EditText) -> TimedEdit:
-    name, _, time = text.when.partition("=")
-    try:
-        time_s = float(time)
-    except ValueError:
-        time_s = math.nan
-    if name != "t" or not 0.0 <= time_s < math.inf:
-        raise EditError(f"'{text}' does not say when: expected @t=SECONDS behind a world edit")
-    return TimedEdit(edit=world_edit(replace(text, when="")), time_s=time_s)
 
 
 def decisions_before(time_s: float, control_dt_s: float) -> int:

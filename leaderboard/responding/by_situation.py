@@ -9,14 +9,19 @@ from numpy.typing import NDArray
 
 from leaderboard.responding.claims import common_groups
 from leaderboard.responding.drive_responses import DriveResponses
-from leaderboard.statistics.resampling import Interval, clustered, mean_interval, ratio_interval
+from leaderboard.statistics.bootstrap import (
+    BootstrapInterval,
+    cluster_sums,
+    pooled_mean_interval,
+    pooled_ratio_interval,
+)
 
 MEASURES = ("Gx", "Gy", "strength", "share")
 
 
 def by_situation(
     drives: Sequence[DriveResponses], measure: str = "strength"
-) -> Mapping[str, Mapping[str, Interval]]:
+) -> Mapping[str, Mapping[str, BootstrapInterval]]:
     """Component to situation to the mean response there.
 
     Args:
@@ -26,8 +31,8 @@ def by_situation(
     groups, routes = common_groups(drives), [drive.route_hash for drive in drives]
     return {
         group: {
-            situation: mean_interval(
-                clustered(
+            situation: pooled_mean_interval(
+                cluster_sums(
                     np.array([_sum(drive, measure, group, situation) for drive in drives], float),
                     routes,
                 )
@@ -38,7 +43,7 @@ def by_situation(
     }
 
 
-def ratios_in(drives: Sequence[DriveResponses], situation: str) -> Mapping[str, Interval]:
+def ratios_in(drives: Sequence[DriveResponses], situation: str) -> Mapping[str, BootstrapInterval]:
     """Component to its mean strength in a situation over that in all other moments.
 
     Empty if the situation never held, or always.
@@ -53,10 +58,10 @@ def ratios_in(drives: Sequence[DriveResponses], situation: str) -> Mapping[str, 
             (drive.strength[mask, place].sum(), mask.sum())
             for drive, mask in zip(drives, masks, strict=True)
         ]
-        return clustered(np.array(pairs, float), routes)
+        return cluster_sums(np.array(pairs, float), routes)
 
     return {
-        group: ratio_interval(sums(place, holds), sums(place, [~mask for mask in holds]))
+        group: pooled_ratio_interval(sums(place, holds), sums(place, [~mask for mask in holds]))
         for place, group in enumerate(groups)
     }
 

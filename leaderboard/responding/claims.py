@@ -25,12 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leaderboard.responding.drive_responses import DriveResponses
-from leaderboard.statistics.resampling import Interval, clustered, ratio_interval
+from leaderboard.statistics.bootstrap import (
+    BootstrapInterval,
+    cluster_sums,
+    pooled_ratio_interval,
+)
+from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
 
 LEVEL = 0.95  # of all claims together
 SLIGHT = 1.1  # a rise of less than a tenth is none
 RISES, STANDS_OUT = "rises", "stands out"
-HOLDS, FAILS, OPEN = "holds", "does not hold", "undecided"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,28 +133,24 @@ class Finding:
     """
 
     claim: Claim
-    strength: Interval
-    share: Interval
+    strength: BootstrapInterval
+    share: BootstrapInterval
     moments: int
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> ClaimVerdict:
         """On the strength, as the paper means it."""
         return verdict_on(self.strength)
 
     @property
-    def share_verdict(self) -> str:
+    def share_verdict(self) -> ClaimVerdict:
         """On the share."""
         return verdict_on(self.share)
 
 
-def verdict_on(ratio: Interval) -> str:
+def verdict_on(ratio: BootstrapInterval) -> ClaimVerdict:
     """What an interval of a ratio says of "more"."""
-    if ratio.low is None or ratio.high is None:
-        return OPEN
-    if ratio.low > 1.0:
-        return HOLDS
-    return FAILS if ratio.high < SLIGHT else OPEN
+    return verdict_of_interval(ratio.low, ratio.high, holds_above=1.0, fails_below=SLIGHT)
 
 
 def examined(drives: Sequence[DriveResponses]) -> tuple[Finding, ...]:
@@ -164,12 +164,12 @@ def examined(drives: Sequence[DriveResponses]) -> tuple[Finding, ...]:
     """
     groups = common_groups(drives)
     claims = [claim for claim in CLAIMS if claim.component in groups]
-    level = 1.0 - (1.0 - LEVEL) / len(claims) if claims else LEVEL
+    tail = (1.0 - LEVEL) / max(len(claims), 1) / 2.0
     return tuple(
         Finding(
             claim=claim,
-            strength=_ratio(claim, drives, "strength", level),
-            share=_ratio(claim, drives, "share", level),
+            strength=_ratio(claim, drives, "strength", tail),
+            share=_ratio(claim, drives, "share", tail),
             moments=sum(int(claim.moments(drive).sum()) for drive in drives),
         )
         for claim in claims
@@ -188,7 +188,9 @@ def common_groups(drives: Sequence[DriveResponses]) -> tuple[str, ...]:
     return found.pop()
 
 
-def _ratio(claim: Claim, drives: Sequence[DriveResponses], measure: str, level: float) -> Interval:
+def _ratio(
+    claim: Claim, drives: Sequence[DriveResponses], measure: str, tail: float
+) -> BootstrapInterval:
     over, under = [], []
     for drive in drives:
         values = getattr(drive, measure)  # (N, G)
@@ -200,6 +202,8 @@ def _ratio(claim: Claim, drives: Sequence[DriveResponses], measure: str, level: 
         else:
             under.append((values[holds].mean(axis=1).sum(), holds.sum()))
     routes = [drive.route_hash for drive in drives]
-    return ratio_interval(
-        clustered(np.array(over, float), routes), clustered(np.array(under, float), routes), level
+    return pooled_ratio_interval(
+        cluster_sums(np.array(over, float), routes),
+        cluster_sums(np.array(under, float), routes),
+        tail,
     )

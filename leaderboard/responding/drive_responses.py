@@ -15,10 +15,11 @@ from agents.base import Agent
 from agents.explain.responses import Response, responses_at
 from agents.explain.situations import SITUATIONS, situations_of
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env
+from leaderboard.replaying.recorded_agent import RetraceError, retrace_env
+from leaderboard.replaying.retracing import retrace
 from leaderboard.scoring.names import EVENT_NAMES
-from leaderboard.scoring.rules import rules_named
 
 EVERY_S = 0.5  # between two moments that are looked at, unless told otherwise
 
@@ -102,7 +103,7 @@ def drive_responses(
     Args:
         run: The run.
         record: The route.
-        agent: From `retracing.run_agent`.
+        agent: From `recorded_agent.run_agent`.
         every_s: Time between two looks, rounded to whole decisions.
         env: From `retrace_env(run, prompt=True)`; None makes one.
         on_decision: Told the game time of each decision.
@@ -144,6 +145,11 @@ def drive_responses(
         waypoints=_stacked(responses, "waypoints"),
         holds=np.array(holds, bool),
     )
+
+
+def plain_words(name: str) -> str:
+    """`stop sign` of `stop_sign`: a component or situation as people read it."""
+    return name.replace("_", " ")
 
 
 def drive_hash(record: RouteRecord) -> str:

@@ -16,9 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.responding.claims import FAILS, HOLDS, OPEN
 from leaderboard.responding.drive_responses import DriveResponses
-from leaderboard.statistics.resampling import Interval, clustered, mean_interval
+from leaderboard.statistics.bootstrap import (
+    BootstrapInterval,
+    cluster_sums,
+    pooled_mean_interval,
+)
+from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
 
 _SLIGHT_EXCESS = 0.1  # a smaller difference of correlations is none
 
@@ -37,9 +41,9 @@ class HeadConsistency:
 
     heads: NDArray[np.float64]
     favourites: tuple[tuple[str, ...], ...]
-    mean: Interval
-    alike: Interval
-    excess: Interval
+    mean: BootstrapInterval
+    alike: BootstrapInterval
+    excess: BootstrapInterval
 
 
 def head_consistency(drives: Sequence[DriveResponses]) -> HeadConsistency | None:
@@ -55,8 +59,10 @@ def head_consistency(drives: Sequence[DriveResponses]) -> HeadConsistency | None
     mean = each.mean(axis=(1, 2))
     routes = [drive.route_hash for drive in drives]
 
-    def interval(values: NDArray[np.float64]) -> Interval:
-        return mean_interval(clustered(np.stack([values, np.ones_like(values)], 1), routes))
+    def interval(values: NDArray[np.float64]) -> BootstrapInterval:
+        return pooled_mean_interval(
+            cluster_sums(np.stack([values, np.ones_like(values)], 1), routes)
+        )
 
     total = np.concatenate([drive.attention for drive in drives]).mean(axis=0)
     names = drives[0].groups
@@ -69,14 +75,10 @@ def head_consistency(drives: Sequence[DriveResponses]) -> HeadConsistency | None
     )
 
 
-def verdict_of_heads(found: HeadConsistency) -> str:
+def verdict_of_heads(found: HeadConsistency) -> ClaimVerdict:
     """Whether heads keep preferences of their own, by the interval of the excess."""
-    low, high = found.excess.low, found.excess.high
-    if low is None or high is None:
-        return OPEN
-    if low > 0.0:
-        return HOLDS
-    return FAILS if high < _SLIGHT_EXCESS else OPEN
+    excess = found.excess
+    return verdict_of_interval(excess.low, excess.high, holds_above=0.0, fails_below=_SLIGHT_EXCESS)
 
 
 def consistency(attention: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from agents.explain.protocol import explainable
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.replaying.retracing import retrace_env, run_agent
+from leaderboard.replaying.recorded_agent import retrace_env, run_agent
 from leaderboard.responding.drive_responses import DriveResponses, drive_hash, drive_responses
 from leaderboard.responding.response_files import (
     ResponseFileError,

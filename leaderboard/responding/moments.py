@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 
 MARKED = 3
 _APART_S = 2.0
@@ -52,7 +52,7 @@ def stretches(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def moment_name(drive: DriveResponses, index: int) -> str:
     """`t = 12.5 s (turning, junction)`."""
     holds = [
-        name.replace("_", " ")
+        plain_words(name)
         for name, held in zip(drive.situations, drive.holds[index], strict=True)
         if held
     ]

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from di_envs.files.json_values import parsed
+from di_envs.files.whole import write_whole
 from leaderboard.responding.drive_responses import DriveResponses
 
 FORMAT = "driveinsight-responses"
@@ -35,14 +37,10 @@ def write_responses(path: Path, drive: DriveResponses) -> None:
     Raises:
         OSError: If it cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     fields = {field.name: getattr(drive, field.name) for field in dataclasses.fields(drive)}
     arrays = {name: fields.pop(name) for name in _ARRAYS}
     about = json.dumps({"format": FORMAT, "format_version": FORMAT_VERSION, **fields})
-    scratch = path.with_suffix(".part")
-    with scratch.open("wb") as file:
-        np.savez_compressed(file, about=np.array(about), **arrays)
-    scratch.replace(path)
+    write_whole(path, lambda file: np.savez_compressed(file, about=np.array(about), **arrays))
 
 
 def read_responses(path: Path) -> DriveResponses:
@@ -53,7 +51,7 @@ def read_responses(path: Path) -> DriveResponses:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            about: dict[str, Any] = json.loads(str(file["about"]))
+            about: dict[str, Any] = parsed(str(file["about"]), "about")
             arrays = {name: file[name] for name in _ARRAYS}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise ResponseFileError(

@@ -9,12 +9,11 @@ from typing import Any
 
 from numba.core import event as numba_event
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from di_envs.numerics.kernels import kernel_sources
+from leaderboard.running.displays.compile_bar import CompileBar
+from leaderboard.running.displays.work_bar import EACH, work_bar
 from leaderboard.running.messages import Compiling
-
-COMPILING = "Compiling kernels, once for this version and CPU (a minute or so)"
 
 
 @contextmanager
@@ -27,29 +26,15 @@ def compile_events(tell: Callable[[Compiling], None]) -> Iterator[None]:
 @contextmanager
 def compile_progress(console: Console) -> Iterator[None]:
     """Shows a bar once a kernel is compiled within; nothing if all come from the cache."""
-    progress = Progress(
-        TextColumn("  compiling"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-        console=console,
-    )
-    task = progress.add_task("")
-
-    def show(event: Compiling) -> None:
-        if not progress.live.is_started:
-            console.print(COMPILING)
-            progress.start()
-        progress.update(task, description=event.kernel, completed=event.done, total=event.total)
-
+    bars = work_bar(EACH, console=console)
+    bar = CompileBar(bars)
     try:
-        with compile_events(show):
+        with compile_events(bar.show):
             yield
     finally:
-        if progress.live.is_started:  # full: kernels that are not needed are not compiled
-            progress.update(task, description="done", completed=progress.tasks[task].total)
-            progress.stop()
+        bar.fill()
+        if bars.live.is_started:
+            bars.stop()
 
 
 class _Listener(numba_event.Listener):

@@ -3,33 +3,43 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import gymnasium
-from gymnasium import spaces
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress
 
-from agents.base import Requirements
-from di_envs.observation import observation_space
+from agents.base import Agent, Requirements
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.camera.config import Rig, rig_of
+from di_envs.rules import rules_named
+from di_envs.suites import choose_suite
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.compiling import compile_progress
+from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.driver import environment_options
-from leaderboard.running.episode import drive_route
-from leaderboard.running.interventions import sort_interventions
+from leaderboard.running.episode import close_agent, drive_route
+from leaderboard.running.front_camera import with_front_camera
+from leaderboard.running.interventions import (
+    Interventions,
+    check_interventions,
+    seen_space,
+    sort_interventions,
+    texts_of,
+)
 from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.video import open_video
+from leaderboard.running.setting_up import made_agent
+from leaderboard.running.video import VideoWriter, open_video
 from leaderboard.running.warm_up import warm_up
-from leaderboard.scoring.rules import rules_named
+from leaderboard.scoring.names import EVENT_NAMES
 
 Watch = Callable[[Mapping[str, Any], dict[str, Any]], None]  # info, observation
+_SUITE_OPTIONS = ("town", "routes", "signals", "scenarios")
 
 
 def drive(
@@ -42,6 +52,8 @@ def drive(
     camera: bool = True,
 ) -> RouteRecord:
     """Drives one route, exactly as `evaluate` does with this route and seed.
+
+    Agent, environment and route are made once: what is warmed up is what drives.
 
     Args:
         spec: The agent, the environment's options and the rules.
@@ -56,70 +68,56 @@ def drive(
         VideoError: If the video cannot be written.
     """
     with contextlib.ExitStack() as closing:
-        scene = warm_up(spec, console)
-        env = _environment(spec, scene.requires, filmed=video is not None, camera=camera)
+        agent, requires = made_agent(spec.agent)
+        ready = closing.enter_context(_closed_unless_taken(agent))
+        spec = _of_one_route(spec, route_id)
+        env, edits = _environment(spec, requires, filmed=video is not None, camera=camera)
         closing.callback(env.close)
-        fps = env.metadata["render_fps"]
-        film = None if video is None else closing.enter_context(open_video(video, fps))
-        job = Job(index=0, route_id=route_id or scene.route_ids[0], seed=seed)
-        if film is not None:
-            with compile_progress(console):  # cameras that the agent itself does not need
-                first, _ = env.reset(seed=job.world_seed, options={"route": job.route_id})
-                env.picture(first)
-        shown = closing.enter_context(_progress(console))
-        task = shown.add_task("", total=100.0)
-
-        def watch(info: Mapping[str, Any], observation: dict[str, Any]) -> None:
-            for event in info["events"]:
-                shown.print(event_line(event))
-            standing = f"{info['game_time_s']:.1f} s, DS {info['driving_score']:.1f}"
-            shown.update(task, completed=info["route_completion"], description=standing)
+        driver = _edited(edits, agent, spec.agent)
+        film = None
+        if video is not None:
+            film = closing.enter_context(open_video(video, env.metadata["render_fps"]))
+        job = Job(index=0, route_id=env.route_ids[0], seed=seed)
+        with compile_progress(console):
+            warm_up(edits.around(env), driver, job)
             if film is not None:
-                film.add(env.picture(observation))
-
-        groups = _groups(spec, scene.requires)
-        keys = observation_space(groups, env.config.cameras, env.config.lidar).keys()
-        watched = Watched(env, watch, keys)  # a spectator sees what is there, edited or not
-        edits = sort_interventions(spec.interventions, watched.observation_space)
+                env.picture({})
+        shown = closing.enter_context(work_bar("driving", "%", console=console))
+        # A spectator sees what is there, edited or not
+        watched = Watched(env, _spectator(env, shown, film))
         return drive_route(
             edits.around(watched),
-            lambda: edits.agent(spec.agent),
+            lambda: ready(driver),
             job,
             rules_named(spec.rules),
-            requires=scene.requires,
-            interventions=spec.interventions,
+            requires=requires,
+            interventions=texts_of(spec.interventions),
         )
 
 
 class Watched(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Shows every step's result to a spectator, and the agent no more than its observation."""
+    """Shows every step's result to a spectator."""
 
-    def __init__(self, env: RouteEnv, watch: Watch, keys: Iterable[str]) -> None:
+    def __init__(self, env: RouteEnv, watch: Watch) -> None:
         super().__init__(env)
-        self._watch, self._keys = watch, frozenset(keys)
-        shown: Any = env.observation_space
-        own = {key: part for key, part in shown.items() if key in self._keys}
-        self.observation_space = spaces.Dict(own)
+        self._watch = watch
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Resets the environment."""
         observation, info = self.env.reset(**arguments)
         self._watch(info, observation)
-        return self._own(observation), info
+        return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Steps the environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         self._watch(info, observation)
-        return self._own(observation), reward, terminated, truncated, info
-
-    def _own(self, observation: Mapping[str, Any]) -> dict[str, Any]:
-        return {key: value for key, value in observation.items() if key in self._keys}
+        return observation, reward, terminated, truncated, info
 
 
 def event_line(event: Event) -> str:
     """An event as a line: `  12.3 s  red light at (10.0, -4.5)`."""
-    name = event.kind.name.lower().replace("_", " ")
+    name = EVENT_NAMES[event.kind]
     metres = f", {event.value:.1f} m" if event.value else ""
     place = f"({event.x:.1f}, {event.y:.1f})"
     return escape(f"{event.tick * TICK_S:7.1f} s  {name}{metres} at {place}")
@@ -143,34 +141,72 @@ def record_lines(record: RouteRecord) -> list[str]:
     return lines
 
 
-def _groups(spec: RunSpec, requires: Requirements) -> tuple[str, ...]:
-    groups: tuple[str, ...] = environment_options(spec.options, requires)["observations"]
-    return tuple(groups)
+@contextlib.contextmanager
+def _closed_unless_taken(agent: Agent[Any]) -> Iterator[Callable[[Agent[Any]], Agent[Any]]]:
+    """Hands the agent over to whoever drives it, and closes it; closes it itself if none does."""
+    taken = []
 
+    def take(driver: Agent[Any]) -> Agent[Any]:
+        taken.append(driver)
+        return driver
 
-def _environment(spec: RunSpec, requires: Requirements, *, filmed: bool, camera: bool) -> RouteEnv:
-    """The run's environment; with the front camera where the film shows it."""
-    options = environment_options(spec.options, requires)
-    groups = _groups(spec, requires)
-    if filmed and camera and "camera" not in groups:
-        options["observations"] = (*groups, "camera")
-        cameras = rig_of(options.get("cameras", "small")).cameras
-        front = [camera for camera in cameras if camera.name == "camera_front"]
-        options["cameras"] = Rig(cameras=tuple(front or cameras[:1]))
     try:
-        return RouteEnv(render_mode="rgb_array" if filmed else None, **options)
+        yield take
+    finally:
+        if not taken:
+            close_agent(agent)
+
+
+def _of_one_route(spec: RunSpec, route_id: str | None) -> RunSpec:
+    """The same with one route to plan."""
+    options = spec.options
+    try:
+        if route_id is None:
+            suite = choose_suite(
+                options.get("suite"), **{name: options.get(name) for name in _SUITE_OPTIONS}
+            )
+            town = suite.town_path.stem  # of a file with routes in several
+            route_id = suite.specs(town, options.get("route_ids"))[0].route_id
     except (ValueError, OSError) as error:
+        raise SetupError(str(error)) from error
+    return dataclasses.replace(spec, options={**options, "route_ids": (route_id,)})
+
+
+def _environment(
+    spec: RunSpec, requires: Requirements, *, filmed: bool, camera: bool
+) -> tuple[RouteEnv, Interventions]:
+    """The run's environment, with the front camera where the film shows it, and the edits."""
+    own = environment_options(spec.options, requires)
+    shown = with_front_camera(own) if filmed and camera else own
+    try:
+        env = RouteEnv(render_mode="rgb_array" if filmed else None, **shown)
+    except (ValueError, OSError) as error:
+        raise SetupError(str(error)) from error
+    space: Any = env.observation_space
+    if shown["observations"] != own["observations"]:
+        space = seen_space(own["observations"], env.config)
+    return env, sort_interventions(spec.interventions, space)
+
+
+def _edited(edits: Interventions, agent: Agent[Any], name: str) -> Agent[Any]:
+    """The agent with what is edited inside it."""
+    try:
+        check_interventions(edits, agent, name)
+        return edits.within(agent, name)
+    except ValueError as error:
         raise SetupError(str(error)) from error
 
 
-@contextlib.contextmanager
-def _progress(console: Console) -> Iterator[Progress]:
-    columns = (
-        TextColumn("  driving  "),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=console) as progress:
-        yield progress
+def _spectator(env: RouteEnv, shown: Progress, film: VideoWriter | None) -> Watch:
+    """Tells of events and progress, and films."""
+    task = shown.add_task("", total=100.0)
+
+    def watch(info: Mapping[str, Any], observation: dict[str, Any]) -> None:
+        for event in info["events"]:
+            shown.print(event_line(event))
+        standing = f"{info['game_time_s']:.1f} s, DS {info['driving_score']:.1f}"
+        shown.update(task, completed=info["route_completion"], description=standing)
+        if film is not None:
+            film.add(env.picture(observation))
+
+    return watch

@@ -9,13 +9,13 @@ from typing import Any
 from agents import load_agent
 from agents.base import Agent, Requirements
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.episode import close_agent, drive_route
-from leaderboard.running.interventions import sort_interventions
+from leaderboard.running.interventions import sort_interventions, texts_of
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.timed_agent import TimedAgent
 from leaderboard.running.wall_clock import Doing, Stopwatch
-from leaderboard.scoring.rules import rules_named
 
 
 class Driver:
@@ -32,7 +32,8 @@ class Driver:
         self._rules = rules_named(spec.rules)
         self.requires = requires or agent_requirements(spec.agent)
         self.env = RouteEnv(**environment_options(spec.options, self.requires))
-        self.interventions = sort_interventions(spec.interventions, self.env.observation_space)
+        space: Any = self.env.observation_space
+        self.interventions = sort_interventions(spec.interventions, space)
         self._shown = self.interventions.around(self.env)
 
     def drive(self, job: Job, moved: Callable[[], None] = lambda: None) -> RouteRecord:
@@ -51,7 +52,7 @@ class Driver:
                 job,
                 self._rules,
                 requires=self.requires,
-                interventions=self.spec.interventions,
+                interventions=texts_of(self.spec.interventions),
             )
         finally:
             self._watch.end_job()

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from agents.base import Agent, Requirements
+from di_envs.rules import Rules
 from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan
-from di_envs.world.world import Event, WorldView
+from di_envs.world.world import WorldView
 from leaderboard.records.record import (
     AGENT_CRASHED,
     NOT_SET_UP,
@@ -26,9 +27,9 @@ from leaderboard.records.record import (
     SIMULATION_CRASHED,
     RouteRecord,
 )
+from leaderboard.running.finished_route import lost_record, route_record
 from leaderboard.running.jobs import Job
-from leaderboard.running.log import EpisodeLog, lost_record, route_record
-from leaderboard.scoring.rules import Rules
+from leaderboard.running.log import EpisodeLog
 
 _LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
 _CONTROL_NAMES = ("throttle", "steer", "brake")
@@ -110,9 +111,9 @@ def _drive(
         over = False
         while not over:
             seen = {**observation, **extras} if extras else observation
-            control, memory = _act(agent, seen, memory)
-            observation, reward, over, events = _step(env, control)
-            log.add_step(control, reward, events)
+            control, memory = decide(agent, seen, memory)
+            observation, reward, over, info = step(env, control)
+            log.add_step(control, reward, info["events"])
             log.hashes.add_observation(observation)
     finally:
         close_agent(agent)
@@ -146,8 +147,12 @@ def _start(
         raise FaultError(NOT_SET_UP, describe(error)) from error
 
 
-def _act(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tuple[Any, Any]:
-    """One decision of the agent, checked."""
+def decide(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tuple[Any, Any]:
+    """One decision of the agent, checked: its control, and its memory for the next.
+
+    Raises:
+        FaultError: If its code fails, or its control is none.
+    """
     try:
         control, memory = agent.act(observation, memory)
         control = np.asarray(control, dtype=np.float32)
@@ -155,13 +160,13 @@ def _act(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tupl
         raise FaultError(SENSORS_INVALID, str(error)) from error
     except (Exception, SystemExit) as error:
         raise FaultError(AGENT_CRASHED, describe(error)) from error
-    wrong = control_error(control)
+    wrong = _control_error(control)
     if wrong:
         raise FaultError(AGENT_CRASHED, wrong)
     return control, memory
 
 
-def control_error(control: np.ndarray[Any, Any]) -> str:
+def _control_error(control: np.ndarray[Any, Any]) -> str:
     """What is wrong with a control [throttle, steer, brake]; empty when nothing is."""
     if control.shape != (3,):
         return f"act returned a control of shape {control.shape}, expected (3,)"
@@ -172,12 +177,17 @@ def control_error(control: np.ndarray[Any, Any]) -> str:
     return ""
 
 
-def _step(env: Any, control: Any) -> tuple[Mapping[str, Any], float, bool, list[Event]]:
+def step(env: Any, control: Any) -> tuple[Mapping[str, Any], float, bool, Mapping[str, Any]]:
+    """What a decision leads to: observation, reward, whether the route is over, and `info`.
+
+    Raises:
+        FaultError: If the simulator's code fails.
+    """
     try:
         observation, reward, terminated, truncated, info = env.step(control)
     except Exception as error:
         raise FaultError(SIMULATION_CRASHED, describe(error)) from error
-    return observation, float(reward), terminated or truncated, info["events"]
+    return observation, float(reward), terminated or truncated, info
 
 
 def close_agent(agent: Agent[Any]) -> None:

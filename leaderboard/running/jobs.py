@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wrappers.interventions.edit import ObservationEdit
 
 
 class SetupError(Exception):
@@ -20,13 +23,13 @@ class RunSpec:
         agent: An agent's name, `module:Class` or `path/to/file.py:Class`.
         options: Environment options; what the agent requires is added to them.
         rules: Name of the scoring rules.
-        interventions: What is edited of what the agent sees, as text.
+        interventions: What is edited of what the agent sees.
     """
 
     agent: str
     options: Mapping[str, Any] = field(default_factory=dict)
     rules: str = "carla-1.0"
-    interventions: tuple[str, ...] = ()
+    interventions: tuple[ObservationEdit, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ class Scene:
     """What a worker learns of a run before it drives, and what machine it is on."""
 
     requires: Requirements
-    agent_hash: str
+    agent_version: str
     town: str
     town_hash: str
     route_ids: tuple[str, ...]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.building import route_arrays
 from di_envs.world.events.rows import COLUMNS
 from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS, advance_lights, start_lights
 from di_envs.world.scenarios.staging import watch_scenarios
@@ -27,7 +28,6 @@ from di_envs.world.state import (
     state_dtype,
     views_of,
 )
-from di_envs.world.world import route_arrays
 
 
 class QuietWorld:

@@ -173,7 +173,7 @@ class _Evaluation:
 
 
 def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
-    from leaderboard.running.log import lost_record  # loads what only workers need
+    from leaderboard.running.finished_route import lost_record  # loads what only workers need
 
     return dataclasses.replace(lost_record(job, reason), status=status)
 
@@ -184,7 +184,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
     return RunRecord(
         rules=spec.rules,
         agent=spec.agent,
-        agent_hash=scene.agent_hash,
+        agent_version=scene.agent_version,
         track=str(requires.track),
         requires={
             "observations": list(requires.observations),
@@ -203,7 +203,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: Scene) -> R
         versions=scene.versions,
         cpu=scene.cpu,
         planned=len(jobs),
-        interventions=spec.interventions,
+        interventions=tuple(map(str, spec.interventions)),
     )
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
-from agents import AgentSpecError
-from agents.base import Requirements
+from agents import AgentSpecError, load_agent
+from agents.base import Agent, Requirements
+from agents.versions import agent_version
 from di_envs.numerics.kernels import cpu_capability
-from leaderboard.records.versions import agent_hash, package_versions
-from leaderboard.running.driver import Driver, agent_requirements
-from leaderboard.running.episode import describe
+from leaderboard.records.versions import package_versions
+from leaderboard.running.driver import Driver
+from leaderboard.running.episode import close_agent, describe
+from leaderboard.running.finished_route import route_hash
 from leaderboard.running.interventions import check_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.log import route_hash
 from leaderboard.running.messages import Scene
 from leaderboard.running.wall_clock import Doing, Stopwatch
 
@@ -23,34 +25,56 @@ def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None
     Args:
         spec: The run.
         watch: Where the driver marks what it is doing.
-        requires: What the agent requires, if that is known; else one is made and asked.
+        requires: What the agent requires, if that is known; else one is made and asked, and the
+            edits are checked against it.
 
     Raises:
         SetupError: If the agent cannot be made, or the environment refuses its options.
     """
     watch.mark(Doing.SETTING_UP)
-    first_time = requires is None
-    requires = requires or _requirements(spec.agent)
+    if requires is not None:
+        return _loaded(spec, watch, requires)
+    agent, requires = made_agent(spec.agent)
+    try:
+        driver = _loaded(spec, watch, requires)
+        watch.mark(Doing.SETTING_UP)
+        check_interventions(driver.interventions, agent, spec.agent)
+    except ValueError as error:
+        raise SetupError(str(error)) from error
+    finally:
+        close_agent(agent)
+    return driver
+
+
+def _loaded(spec: RunSpec, watch: Stopwatch, requires: Requirements) -> Driver:
+    """The driver, once its town is loaded and the first route begun."""
     watch.mark(Doing.LOADING)
     try:
         driver = Driver(spec, requires, watch)
         first = Job(index=0, route_id=driver.env.route_ids[0], seed=0)
         driver.env.reset(seed=first.world_seed, options={"route": first.route_id})
-        if first_time:
-            space = driver.env.observation_space
-            check_interventions(driver.interventions, spec.agent, space, requires)
     except (ValueError, OSError, ImportError) as error:
         raise SetupError(str(error)) from error
     return driver
 
 
-def _requirements(agent: str) -> Requirements:
+def made_agent(spec: str) -> tuple[Agent[Any], Requirements]:
+    """The agent of that name, and what it requires.
+
+    Raises:
+        SetupError: If it cannot be made.
+    """
     try:
-        return agent_requirements(agent)
+        agent = load_agent(spec)
+        try:
+            return agent, agent.requires
+        except BaseException:
+            close_agent(agent)
+            raise
     except AgentSpecError as error:
         raise SetupError(str(error)) from error
     except (Exception, SystemExit) as error:
-        raise SetupError(f"agent '{agent}' cannot be made: {describe(error)}") from error
+        raise SetupError(f"agent '{spec}' cannot be made: {describe(error)}") from error
 
 
 def scene_of(driver: Driver) -> Scene:
@@ -61,11 +85,11 @@ def scene_of(driver: Driver) -> Scene:
         routes.update(f"{plan.route_id}\0{route_hash(plan)}\0".encode())
     return Scene(
         requires=driver.requires,
-        agent_hash=agent_hash(driver.spec.agent),
+        agent_version=agent_version(driver.spec.agent),
         town=town.name,
         town_hash=town.content_hash,
         route_ids=tuple(driver.env.route_ids),
         routes_hash=routes.hexdigest(),
-        versions=package_versions(),
+        versions=package_versions(driver.spec.agent),
         cpu=cpu_capability(),
     )

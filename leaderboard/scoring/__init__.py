@@ -1,1 +1,1 @@
-"""How events and progress become scores: rules as named data, scores as functions of values."""
+"""How events and progress become a score, and what people call events."""

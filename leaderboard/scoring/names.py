@@ -5,22 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from di_envs.world.kinds import EventKind
+from di_envs.world.event_names import EVENT_NAMES
 
-EVENT_NAMES: Mapping[EventKind, str] = MappingProxyType(
-    {
-        EventKind.COLLISION_WALKER: "walker hit",
-        EventKind.COLLISION_VEHICLE: "vehicle hit",
-        EventKind.COLLISION_STATIC: "object hit",
-        EventKind.RED_LIGHT: "red light",
-        EventKind.STOP_SIGN: "stop sign",
-        EventKind.OUTSIDE_LANES: "outside lanes",
-        EventKind.ROUTE_DEVIATION: "off route",
-        EventKind.TIMEOUT: "timeout",
-        EventKind.BLOCKED: "blocked",
-        EventKind.MIN_SPEED: "too slow",
-    }
-)
+__all__ = ["EVENT_NAMES", "SCENARIO_NAMES"]
 
 # By the Leaderboard's number
 SCENARIO_NAMES: Mapping[str, str] = MappingProxyType(

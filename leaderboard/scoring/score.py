@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from di_envs.rules import Rules
 from di_envs.world.state import EventKind
-from leaderboard.scoring.rules import Rules
 
 
 class Counted(Protocol):

@@ -14,7 +14,7 @@ _BISECTIONS = 80  # each halves the angle that holds the quantile: more than a f
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interval:
+class MeanInterval:
     """A mean and the half width of its 95 % interval, None where there is but one value."""
 
     mean: float
@@ -59,7 +59,7 @@ def _within(angle: float, degrees: int) -> float:
     return 2.0 / math.pi * (angle + sin * total) if odd else sin * total
 
 
-def mean_interval(values: Sequence[float]) -> Interval:
+def mean_interval(values: Sequence[float]) -> MeanInterval:
     """The 95 % t-interval of the mean of independent values, such as one mean a seed.
 
     Raises:
@@ -70,6 +70,6 @@ def mean_interval(values: Sequence[float]) -> Interval:
     count = len(values)
     mean = math.fsum(values) / count
     if count == 1:
-        return Interval(mean=mean, half_width=None)
+        return MeanInterval(mean=mean, half_width=None)
     variance = math.fsum((value - mean) ** 2 for value in values) / (count - 1)
-    return Interval(mean=mean, half_width=t_quantile(count - 1) * math.sqrt(variance / count))
+    return MeanInterval(mean=mean, half_width=t_quantile(count - 1) * math.sqrt(variance / count))

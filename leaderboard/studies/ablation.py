@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from di_envs.rules import rules_named
+from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
-from leaderboard.scoring.rules import rules_named
 from leaderboard.scoring.score import infractions_per_km
+from leaderboard.statistics.bootstrap import expanded_interval
+from leaderboard.statistics.rank_correlation import spearman
+from leaderboard.studies import StudyError
 from leaderboard.studies.effects import (
     ALPHA,
     EQUIVALENT,
@@ -19,15 +22,12 @@ from leaderboard.studies.effects import (
     MATTERS,
     Effect,
     effect,
-    interval,
-    spearman,
 )
-from leaderboard.studies.record import Drive, DrivenRow, Study
+from leaderboard.studies.record import DrivenRow, Study, StudyDrive
 from leaderboard.studies.rows import NULL, WAYS
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.table_two import TABLE_2
 
-Pairs = Sequence[tuple[Drive, Drive]]  # without the edit, and with it
+Pairs = Sequence[tuple[StudyDrive, StudyDrive]]  # without the edit, and with it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,12 +182,12 @@ def _per_km(pairs: Pairs, rules: str) -> dict[str, float]:
     for kind in rules_named(rules).infractions:
         before, after = (_rate([pair[side] for pair in pairs], kind) for side in (0, 1))
         if after != before:
-            found[kind.name.lower()] = after - before
+            found[EVENT_KEYS[kind]] = after - before
     return found
 
 
-def _rate(drives: Sequence[Drive], kind: EventKind) -> float:
-    count = sum(drive.events.get(kind.name.lower(), 0) for drive in drives)
+def _rate(drives: Sequence[StudyDrive], kind: EventKind) -> float:
+    count = sum(drive.events.get(EVENT_KEYS[kind], 0) for drive in drives)
     return infractions_per_km(count, math.fsum(drive.done_m for drive in drives))
 
 
@@ -203,65 +203,8 @@ def _correlation(way: str, rows: Sequence[RowFinding]) -> Correlation:
         draws = [spearman(list(ours), theirs) for ours in columns]
         known = np.array([each for each in draws if each is not None])
         if len(known) > len(draws) // 2:
-            low, high = interval(known, rows[0].difference.routes, ALPHA / 2.0)
+            low, high = expanded_interval(known, rows[0].difference.routes, ALPHA / 2.0)
     return Correlation(group=way, rho=rho, low=low, high=high, rows=len(rows))
-
-
-def findings(ablation: Ablation) -> dict[str, Any]:
-    """What was worked out, as JSON values."""
-    rows = {}
-    for row in ablation.rows:
-        found = row.difference
-        rows[row.driven.row.name] = {
-            "driving_score": row.driving_score,
-            "route_completion": row.route_completion,
-            "infraction_score": row.infraction_score,
-            "difference": found.mean,
-            "interval": [found.low, found.high],
-            "one_sided_interval": [found.inner_low, found.inner_high],
-            "verdict": row.verdict,
-            "clear": found.clear,
-            "smallest_effect": found.smallest,
-            "completion_difference": row.completion_difference,
-            "penalty_difference": row.penalty_difference,
-            "per_km": row.per_km,
-            "pairs": found.pairs,
-            "routes": found.routes,
-            "same": row.same,
-            "wall_s": row.driven.wall_s,
-            "paper_difference": row.paper_difference,
-        }
-    correlations = {
-        each.group: {"rho": each.rho, "interval": [each.low, each.high], "rows": each.rows}
-        for each in ablation.correlations
-    }
-    return {"tests": ablation.tests, "rows": rows, "spearman_with_paper": correlations}
-
-
-def sentences(ablation: Ablation) -> list[str]:
-    """One sentence for each row on which the paper and this study differ."""
-    found = []
-    for row in ablation.rows:
-        if row.judged_otherwise_in_paper or row.outside:
-            here = f"{row.difference.mean:+.1f} DS, {_span(row.difference)}"
-            there = f"{row.paper_difference:+.1f} there"
-            found.append(f"{row.driven.row.edit} {_differs(row)} ({here}; {there}).")
-    return found
-
-
-def _differs(row: RowFinding) -> str:
-    """What a row does here, and what in the paper."""
-    if row.judged_otherwise_in_paper:
-        if row.verdict == EQUIVALENT:
-            return "makes no difference here, but does in the paper"
-        return "matters here, but hardly in the paper"
-    if row.difference.mean < (row.paper_difference or 0.0):
-        return "costs more here than in the paper"
-    return "costs less here than in the paper"
-
-
-def _span(found: Effect) -> str:
-    return "no interval" if found.low is None else f"{found.low:+.1f} … {found.high:+.1f}"
 
 
 def _mean(values: Sequence[float]) -> float:

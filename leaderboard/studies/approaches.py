@@ -16,9 +16,10 @@ from di_envs.route_env import RouteEnv
 from di_envs.town.lanes import LightState
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.replay import replay
-from leaderboard.running.bound import PerfectDriver, StopPoint, stop_points
+from leaderboard.running.perfect_driver import PerfectDriver, StopPoint, stop_points
+from leaderboard.statistics.claim_verdict import ClaimVerdict
 from leaderboard.studies.effects import Effect, share_effect
-from leaderboard.studies.experiments import Judgement, Verdict
+from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
 from leaderboard.studies.route_place import RoutePlace
 
@@ -191,10 +192,10 @@ def _plain(values: Sequence[float]) -> str:
     return f"{100 * sum(values) / len(values):.0f} % of {len(values)}"
 
 
-def _verdict(red: Effect, green: Effect) -> Verdict:
+def _verdict(red: Effect, green: Effect) -> ClaimVerdict:
     both = (red, green)
     if all(each.low is not None and each.low > LED for each in both):
-        return Verdict.HOLDS
+        return ClaimVerdict.HOLDS
     if any(each.high is not None and each.high < LED for each in both):
-        return Verdict.DOES_NOT_HOLD
-    return Verdict.UNDECIDED
+        return ClaimVerdict.DOES_NOT_HOLD
+    return ClaimVerdict.UNDECIDED

@@ -10,11 +10,12 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from di_envs.differences import differences
+from di_envs.rules import rules_named
 from di_envs.world.kinds import EventKind
-from leaderboard.records.footing import footing_differences, footing_of
+from leaderboard.records.footing import footing_differences, footing_of, record_differences
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
-from leaderboard.scoring.rules import rules_named
-from leaderboard.statistics.bootstrap import DifferenceInterval, clustered_interval
+from leaderboard.statistics.bootstrap import BootstrapInterval, clustered_interval
 
 # Options of the environment that change what an agent sees or how often it decides, not the world
 _SEEN_ONLY = frozenset({"observations", "cameras", "lidar", "weather", "control_dt_s"})
@@ -83,7 +84,7 @@ class Comparison:
         """Number of distinct routes, by hash: what the interval's doubt rests on."""
         return len({pair.before.route_hash for pair in self.pairs})
 
-    def interval(self, score: str) -> DifferenceInterval:
+    def interval(self, score: str) -> BootstrapInterval:
         """The mean difference, second less first, of one of `SCORES`."""
         return clustered_interval(
             [getattr(p.after.score, score) - getattr(p.before.score, score) for p in self.pairs],
@@ -138,14 +139,10 @@ def compare_runs(before: RunRecord, after: RunRecord) -> Comparison:
 def _obstacles(before: RunRecord, after: RunRecord) -> Iterator[str]:
     """Why the worlds of two runs are not the same, a few words each."""
     yield from footing_differences(footing_of(before), footing_of(after))
-    for name in ("suite", "suite_version", "town", "town_hash"):
-        one, other = getattr(before, name), getattr(after, name)
-        if one != other:
-            yield f"{name} {one}, not {other}"
-    ours, theirs = _world_options(before), _world_options(after)
-    for name in sorted(ours.keys() | theirs.keys()):
-        if ours.get(name) != theirs.get(name):
-            yield f"option {name} {ours.get(name)!r}, not {theirs.get(name)!r}"
+    fields = ("suite", "suite_version", "town", "town_hash")
+    found = record_differences(before, after, fields)
+    ours, theirs = ({"option": _world_options(run)} for run in (before, after))
+    yield from (difference.is_not for difference in (*found, *differences(ours, theirs)))
 
 
 def _world_options(run: RunRecord) -> dict[str, object]:

@@ -8,57 +8,38 @@ already is kept, so repeating a command goes on, and more seeds or rows add to w
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from gymnasium import spaces
 from rich.console import Console
 
-from agents import load_agent
-from di_envs.edits.text import EditError, read_edit
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.footing import record_differences
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
 from leaderboard.records.resuming import resumed
 from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.study import StudyDisplay
-from leaderboard.running.episode import close_agent
 from leaderboard.running.interruption import interruptible
-from leaderboard.running.interventions import (
-    check_interventions,
-    read_interventions,
-    sort_interventions,
-)
+from leaderboard.running.interventions import texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
 from leaderboard.running.messages import Scene
 from leaderboard.running.runner import Existing, evaluate, new_run
-from leaderboard.running.setting_up import scene_of, set_up
-from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
+from leaderboard.studies import StudyError
+from leaderboard.studies.looking_ahead import look_ahead
 from leaderboard.studies.more_seeds import recover_run, replace_run, with_seeds
-from leaderboard.studies.record import Drive, DrivenRow, Study, study_of
-from leaderboard.studies.rows import (
-    BASELINE,
-    BASELINE_ROW,
-    COMPONENTS,
-    NULL,
-    NULL_ROW,
-    ODOMETRY,
-    Row,
-)
-from leaderboard.studies.study_error import StudyError
-from leaderboard.studies.study_file import STUDY_FILE, as_read, read_study
-from wrappers.interventions.layout import SHORT_NAMES
+from leaderboard.studies.record import DrivenRow, Study, StudyDrive, study_of
+from leaderboard.studies.rows import BASELINE, BASELINE_ROW, NULL, NULL_ROW, Row
+from leaderboard.studies.study_file import STUDY_FILE, read_study
 
 ROWS_FOLDER = "rows"
 # What must be as it was for a study to go on; rows and seeds may come to it
 _SAME = (
-    *("kind", "agent", "agent_hash", "requires", "suite", "suite_version", "options", "rules"),
+    *("kind", "agent", "agent_version", "requires", "suite", "suite_version", "options", "rules"),
     *("town_hash", "routes_hash", "interventions", "versions", "cpu"),
 )
 
@@ -112,7 +93,7 @@ def drive_study(
     with folder_lock(folder), interruptible() as interruption:
         earlier = _earlier(folder)
         with compile_progress(console):
-            scene, reasons = _look(plan)
+            scene, reasons = look_ahead(plan.spec, plan.rows)
         driving = _Driving(plan, scene, reasons, folder, earlier, seeds)
         keep(driving.study())
         engine = engine or LocalEngine()
@@ -127,51 +108,6 @@ def drive_study(
 def _earlier(folder: Path) -> Study | None:
     """What the folder holds of a study; None if nothing."""
     return read_study(folder) if (folder / STUDY_FILE).exists() else None
-
-
-def _look(plan: StudyPlan) -> tuple[Scene, dict[str, str]]:
-    """What there is to drive, and by row why it makes no sense for this agent."""
-    driver = set_up(plan.spec, Stopwatch())
-    with driver:
-        reads, reasons = _read_components(plan.spec.agent), {}
-        space = driver.env.observation_space
-        for row in plan.rows:
-            try:
-                texts = read_interventions(row.edit)
-                reasons[row.name] = _unread(texts, reads, space)
-                if reasons[row.name]:
-                    continue
-                edits = sort_interventions(texts, space)
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # one is enough: the null row's
-                    check_interventions(edits, plan.spec.agent, space, driver.requires)
-            except EditError as error:
-                reasons[row.name] = str(error)
-        null = sort_interventions(read_interventions(NULL_ROW.edit), space)
-        check_interventions(null, plan.spec.agent, space, driver.requires)
-        return scene_of(driver), reasons
-
-
-def _read_components(spec: str) -> frozenset[str] | None:
-    """The components that an agent's policy reads, if it says so; None if it does not."""
-    agent = load_agent(spec)
-    try:
-        offered = getattr(agent, "explainable", None)
-        return None if offered is None else frozenset(offered().anatomy.groups)
-    finally:
-        close_agent(agent)
-
-
-def _unread(texts: Sequence[str], reads: frozenset[str] | None, space: spaces.Space[Any]) -> str:
-    """Why edits cannot change what the agent does; empty if they may."""
-    for text in texts:
-        for target in read_edit(text).target.split("+"):
-            name = SHORT_NAMES.get(target, target)
-            if name == ODOMETRY and isinstance(space, spaces.Dict) and name not in space.spaces:
-                return "the agent sees no odometry"
-            if reads is not None and name in COMPONENTS and name not in reads:
-                return f"the policy does not read {name}"
-    return ""
 
 
 class _Driving:
@@ -189,7 +125,8 @@ class _Driving:
         self._plan, self._scene, self._folder = plan, scene, folder
         self._seeds = seeds
         self._head = study_of(plan.kind, self._run_head(BASELINE_ROW, range(seeds)), ())
-        self._head = dataclasses.replace(self._head, interventions=plan.spec.interventions)
+        shared = texts_of(plan.spec.interventions)
+        self._head = dataclasses.replace(self._head, interventions=shared)
         if earlier is not None:
             _check_same(folder, earlier, self._head)
             if len(earlier.seeds) > seeds:
@@ -222,7 +159,7 @@ class _Driving:
         for name, driven in self._rows.items():
             run = self._runs.get(name)
             if run is not None:
-                drives = tuple(Drive.of(record) for record in run.scored)
+                drives = tuple(StudyDrive.of(record) for record in run.scored)
                 driven = dataclasses.replace(driven, planned=run.planned, drives=drives)
             rows.append(driven)
         return dataclasses.replace(self._head, rows=tuple(rows), extra=self._extra)
@@ -296,7 +233,7 @@ class _Driving:
         return new_run(self._spec(row), jobs, self._plan.suite, self._scene)
 
     def _spec(self, row: Row) -> RunSpec:
-        edits = (*self._plan.spec.interventions, *_texts(row))
+        edits = (*self._plan.spec.interventions, *row.edits)
         return dataclasses.replace(self._plan.spec, interventions=edits)
 
     def _row_folder(self, row: Row) -> Path:
@@ -315,10 +252,6 @@ class _Driving:
         return resumed(folder, self._run_head(row, seeds))
 
 
-def _texts(row: Row) -> tuple[str, ...]:
-    return read_interventions(row.edit) if row.edit else ()
-
-
 def _bits(record: RouteRecord) -> object:
     """All of a drive but its place in the run and the edits' names."""
     return dataclasses.replace(record, index=0, interventions=()).fingerprint()
@@ -326,18 +259,9 @@ def _bits(record: RouteRecord) -> object:
 
 def _check_same(folder: Path, earlier: Study, now: Study) -> None:
     """Refuses to go on with another study."""
-    differences = []
-    now = as_read(now)
-    for name in _SAME:
-        old, new = getattr(earlier, name), getattr(now, name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            for key in sorted(old.keys() | new.keys()):
-                if old.get(key) != new.get(key):
-                    differences.append(f"{name} '{key}' was {old.get(key)}, is {new.get(key)}")
-        elif old != new:
-            differences.append(f"{name} was {old}, is {new}")
-    if differences:
+    if found := record_differences(earlier, now, _SAME):
+        said = "; ".join(difference.was_is for difference in found)
         raise StudyError(
-            f"{folder} holds another study, its results would mix: {'; '.join(differences)}. "
-            "Repeat the command as it was, or choose another --output"
+            f"{folder} holds another study, its results would mix: {said}. Repeat the command as "
+            "it was, or choose another --output"
         )

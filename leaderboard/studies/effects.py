@@ -13,8 +13,7 @@ tests lies within the margin; that comes first, as a sure difference that is so 
 importance. Otherwise it is "undecided".
 
 Source: Schuirmann: A Comparison of the Two One-Sided Tests Procedure, Journal of Pharmacokinetics
-and Biopharmaceutics 1987; Hesterberg: What Teachers Should Know About the Bootstrap, The American
-Statistician 2015 (expanded percentile interval); Dunn: Multiple Comparisons Among Means, JASA 1961.
+and Biopharmaceutics 1987; Dunn: Multiple Comparisons Among Means, JASA 1961.
 """
 
 from __future__ import annotations
@@ -22,12 +21,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from leaderboard.statistics.bootstrap import clustered_mean, resampled_means
+from leaderboard.statistics.bootstrap import clustered_mean, expanded_interval, resampled_means
 from leaderboard.statistics.confidence import t_quantile
 
 MARGIN_DS = 5.0  # a smaller difference of driving scores is of no importance
@@ -107,8 +105,8 @@ def effect(
     inner = outer
     smallest = None
     if means is not None:
-        outer = interval(means, count, alpha / tests / 2.0)
-        inner = interval(means, count, alpha / tests)
+        outer = expanded_interval(means, count, alpha / tests / 2.0)
+        inner = expanded_interval(means, count, alpha / tests)
         smallest = _smallest(means, count, alpha / tests)
     return Effect(
         mean=mean,
@@ -156,49 +154,9 @@ def share_effect(
     return replace(found, low=low, high=high, inner_low=inner_low, inner_high=inner_high)
 
 
-def interval(means: NDArray[np.float64], routes: int, tail: float) -> tuple[float, float]:
-    """The expanded percentile interval.
-
-    A bootstrap of n values spreads as if divided by n, not n - 1, and knows of no Student's t: the
-    percentiles are taken further out by both.
-
-    Args:
-        means: Resampled ones.
-        routes: How many distinct ones were resampled, 2 or more.
-        tail: How probably the truth lies beyond each end.
-    """
-    wider = math.sqrt(routes / (routes - 1)) * t_quantile(routes - 1, 1.0 - tail)
-    share = NormalDist().cdf(-wider)
-    low, high = np.quantile(means, [share, 1.0 - share])
-    return float(low), float(high)
-
-
 def _smallest(means: NDArray[np.float64], routes: int, alpha: float) -> float | None:
     error = float(means.std()) * math.sqrt(routes / (routes - 1))
     if error == 0.0:
         return None
     degrees = routes - 1
     return error * (t_quantile(degrees, 1.0 - alpha / 2.0) + t_quantile(degrees, POWER))
-
-
-def spearman(ours: Sequence[float], theirs: Sequence[float]) -> float | None:
-    """Spearman's rank correlation, equal values sharing the mean of their ranks.
-
-    Returns:
-        -1..1; None below three pairs, or where one side has but one value.
-
-    Raises:
-        ValueError: If the two are not of one length.
-    """
-    if len(ours) != len(theirs):
-        raise ValueError(f"a correlation is of pairs, not of {len(ours)} and {len(theirs)} values")
-    if len(ours) < 3 or len(set(ours)) == 1 or len(set(theirs)) == 1:
-        return None
-    return float(np.corrcoef(_ranks(ours), _ranks(theirs))[0, 1])
-
-
-def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
-    given = np.asarray(values, float)
-    below = (given[None, :] < given[:, None]).sum(axis=1)
-    equal = (given[None, :] == given[:, None]).sum(axis=1)
-    return below + 0.5 * (equal + 1)

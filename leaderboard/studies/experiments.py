@@ -8,24 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from types import MappingProxyType
 from typing import Any
 
 from di_envs.config import check_name
+from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.rows import Row
-from leaderboard.studies.study_error import StudyError
 
 LATERAL_M = 2.0  # over half a lane: into the neighbour's, or to the kerb
 MOVED = ("routing", "target_point", "routing+target_point")
-
-
-class Verdict(StrEnum):
-    """What became of a finding of the paper's."""
-
-    HOLDS = "holds"
-    DOES_NOT_HOLD = "does not hold"
-    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +32,7 @@ class Judgement:
     """
 
     experiment: str
-    verdict: Verdict
+    verdict: ClaimVerdict
     sentence: str
     numbers: Mapping[str, Any]
 

@@ -11,11 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+from leaderboard.statistics.claim_verdict import ClaimVerdict
 from leaderboard.studies.ablation import Pairs, paired
 from leaderboard.studies.effects import Effect, share_effect
-from leaderboard.studies.experiments import Judgement, Verdict
+from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
-from leaderboard.studies.record import Drive, Study
+from leaderboard.studies.record import Study, StudyDrive
 
 FAILURES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -61,7 +62,7 @@ def _no_increase(found: Effect) -> bool:
     return found.inner_high is not None and found.inner_high < NO_INCREASE
 
 
-def has_failed(drive: Drive, failure: str) -> float:
+def has_failed(drive: StudyDrive, failure: str) -> float:
     """1 if a failure happened in a drive, else 0."""
     kinds = sum(FAILURES.values(), ()) if failure == ANY else FAILURES[failure]
     return float(any(drive.events.get(kind, 0) for kind in kinds))
@@ -74,11 +75,11 @@ def judge_map(study: Study) -> Judgement | None:
         return None
     each = [effect for row in found.values() for effect in row.values()]
     if any(one.low is not None and one.low > 0.0 for one in each):
-        verdict = Verdict.DOES_NOT_HOLD
+        verdict = ClaimVerdict.DOES_NOT_HOLD
     elif all(_no_increase(one) for one in each):
-        verdict = Verdict.HOLDS
+        verdict = ClaimVerdict.HOLDS
     else:
-        verdict = Verdict.UNDECIDED
+        verdict = ClaimVerdict.UNDECIDED
     return _judgement("map", verdict, found, study)
 
 
@@ -89,16 +90,16 @@ def judge_bev(study: Study) -> Judgement | None:
         return None
     strongest = list(found.values())[-1][ANY]
     if strongest.low is not None and strongest.low > 0.0:
-        verdict = Verdict.HOLDS
+        verdict = ClaimVerdict.HOLDS
     elif _no_increase(strongest):
-        verdict = Verdict.DOES_NOT_HOLD
+        verdict = ClaimVerdict.DOES_NOT_HOLD
     else:
-        verdict = Verdict.UNDECIDED
+        verdict = ClaimVerdict.UNDECIDED
     return _judgement("bev", verdict, found, study)
 
 
 def _judgement(
-    experiment: str, verdict: Verdict, found: Mapping[str, Mapping[str, Effect]], study: Study
+    experiment: str, verdict: ClaimVerdict, found: Mapping[str, Mapping[str, Effect]], study: Study
 ) -> Judgement:
     parts = []
     for edit, row in found.items():

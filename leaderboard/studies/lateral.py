@@ -13,8 +13,9 @@ import numpy as np
 
 from di_envs.town.plan import RoutePlan
 from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.statistics.claim_verdict import ClaimVerdict
 from leaderboard.studies.effects import Effect, effect
-from leaderboard.studies.experiments import LATERAL_M, MOVED, Judgement, Verdict
+from leaderboard.studies.experiments import LATERAL_M, MOVED, Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
 from leaderboard.studies.route_place import offsets
 
@@ -104,14 +105,14 @@ def judge_route(measured: Mapping[str, Sequence[Offset]]) -> Judgement | None:
     )
 
 
-def _verdict(shares: Mapping[str, Effect]) -> Verdict:
+def _verdict(shares: Mapping[str, Effect]) -> ClaimVerdict:
     *alone, both = (shares[what] for what in MOVED)
     if any(each.low is None or each.high is None for each in shares.values()):
-        return Verdict.UNDECIDED
+        return ClaimVerdict.UNDECIDED
     follows = [each.low is not None and each.low > FOLLOWS for each in alone]
     stays = [each.high is not None and each.high < FOLLOWS for each in alone]
     if both.low is not None and both.low > FOLLOWS and all(stays):
-        return Verdict.HOLDS
+        return ClaimVerdict.HOLDS
     if (both.high is not None and both.high < FOLLOWS) or any(follows):
-        return Verdict.DOES_NOT_HOLD
-    return Verdict.UNDECIDED
+        return ClaimVerdict.DOES_NOT_HOLD
+    return ClaimVerdict.UNDECIDED

@@ -13,14 +13,15 @@ from leaderboard.records.record import RunRecord
 from leaderboard.records.results import RECORD_FILE, read_run
 from leaderboard.replaying.replay import ReplayError, replay_env
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.approaches import Approach, approaches, judge_lights
-from leaderboard.studies.experiments import Experiment, Judgement, Verdict
+from leaderboard.studies.experiments import Experiment, Judgement
 from leaderboard.studies.failures import judge_bev, judge_map
 from leaderboard.studies.lateral import judge_route, lateral_offsets
 from leaderboard.studies.record import Study
 from leaderboard.studies.rows import BASELINE
 from leaderboard.studies.speed_sweep import judge_speed, sweep
-from leaderboard.studies.study_error import StudyError
 
 JUDGEMENTS, MISSING = "judgements", "missing"  # in a study's `extra`
 
@@ -86,7 +87,7 @@ def judged(
 def judgements_of(study: Study) -> list[Judgement]:
     """Those that a record holds."""
     return [
-        Judgement(**{**values, "verdict": Verdict(values["verdict"])})
+        Judgement(**{**values, "verdict": ClaimVerdict(values["verdict"])})
         for values in study.extra.get(JUDGEMENTS, {}).values()
     ]
 
@@ -150,7 +151,7 @@ def prompt_findings(study: Study) -> dict[str, Any]:
 def finding_sentence(judgement: Judgement) -> str:
     """The verdict and its numbers in one sentence."""
     match judgement.verdict:
-        case Verdict.UNDECIDED:
+        case ClaimVerdict.UNDECIDED:
             begin = "Whether the paper's finding holds is undecided"
         case verdict:
             begin = f"The paper's finding {verdict.value} here"

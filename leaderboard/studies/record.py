@@ -10,12 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from di_envs.world.event_names import EVENT_KEYS
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.studies.rows import BASELINE, NULL, Row
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class StudyDrive:
     """A route driven once.
 
     Attributes:
@@ -38,9 +39,9 @@ class Drive:
     events: Mapping[str, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, record: RouteRecord) -> Drive:
+    def of(cls, record: RouteRecord) -> StudyDrive:
         """What a study keeps of a route's record."""
-        counts = Counter(event.kind.name.lower() for event in record.events)
+        counts = Counter(EVENT_KEYS[event.kind] for event in record.events)
         return cls(
             route_id=record.route_id,
             seed=record.seed,
@@ -68,7 +69,7 @@ class DrivenRow:
 
     row: Row
     planned: int = 0
-    drives: tuple[Drive, ...] = ()
+    drives: tuple[StudyDrive, ...] = ()
     left_out: str = ""
 
     @property
@@ -80,7 +81,7 @@ class DrivenRow:
         """Wall-clock time of its drives, added up over all processes."""
         return sum(drive.wall_s for drive in self.drives)
 
-    def by_world(self) -> dict[tuple[str, int], Drive]:
+    def by_world(self) -> dict[tuple[str, int], StudyDrive]:
         """The drives by route and seed: by the world that they were in."""
         return {(drive.route_id, drive.seed): drive for drive in self.drives}
 
@@ -100,7 +101,7 @@ class Study:
 
     kind: str
     agent: str
-    agent_hash: str
+    agent_version: str
     track: str
     requires: Mapping[str, Any]
     suite: str
@@ -154,7 +155,7 @@ def study_of(kind: str, head: RunRecord, interventions: tuple[str, ...]) -> Stud
     return Study(
         kind=kind,
         agent=head.agent,
-        agent_hash=head.agent_hash,
+        agent_version=head.agent_version,
         track=head.track,
         requires=head.requires,
         suite=head.suite,

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from di_envs.config import check_name
-from leaderboard.studies.study_error import StudyError
+from leaderboard.running.interventions import read_interventions
+from leaderboard.studies import StudyError
+from wrappers.interventions.edit import ObservationEdit
 
 BASELINE, NULL = "baseline", "null"
 WAYS = ("drop", "zero")
@@ -44,6 +47,15 @@ class Row:
     edit: str = ""
     component: str = ""
     group: str = ""
+
+    @cached_property
+    def edits(self) -> tuple[ObservationEdit, ...]:
+        """As values, read once.
+
+        Raises:
+            EditError: If they cannot be read.
+        """
+        return read_interventions(self.edit)
 
 
 BASELINE_ROW = Row(name=BASELINE)

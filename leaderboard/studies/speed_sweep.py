@@ -7,12 +7,9 @@ ones too, as the two contradict each other otherwise.
 
 from __future__ import annotations
 
-import json
 import math
-import multiprocessing
-import signal
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +18,24 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from agents.one_thread import one_thread
+from agents.processes import in_order, processes
+from di_envs.files.json_values import JsonError, one_line, read_json
+from di_envs.files.whole import write_whole
 from leaderboard.records.record import RouteRecord
-from leaderboard.records.results import read_run, replace_file
-from leaderboard.replaying.retracing import own_space, retrace, retrace_env, run_agent
+from leaderboard.records.results import read_run
+from leaderboard.replaying.recorded_agent import retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.episode import close_agent
-from leaderboard.studies.effects import ALPHA, Effect, effect, interval
-from leaderboard.studies.experiments import Judgement, Verdict
+from leaderboard.running.interventions import seen_space
+from leaderboard.statistics.bootstrap import expanded_interval
+from leaderboard.statistics.claim_verdict import ClaimVerdict, verdict_of_interval
+from leaderboard.studies import StudyError
+from leaderboard.studies.effects import ALPHA, Effect, effect
+from leaderboard.studies.experiments import Judgement
 from leaderboard.studies.numbers import effect_numbers, span_text
-from leaderboard.studies.study_error import StudyError
 from wrappers.interventions.editing import ObservationEditing
+from wrappers.interventions.values import SetValue
 
 DOSES_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0)
 TARGETS = ("speed", "speed+speed_history")
@@ -71,18 +76,11 @@ def _asked(folder: Path, indices: Sequence[int], workers: int) -> Iterator[None]
             ask_about(folder, index)
             yield
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_ctrl_c) as pool:
+    with processes(workers) as pool:
         try:
-            for done in as_completed([pool.submit(ask_about, folder, i) for i in indices]):
-                done.result()
-                yield
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _ignore_ctrl_c() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+            yield from in_order(pool, partial(ask_about, folder), indices, ahead=2 * workers)
+        except ChildProcessError as error:
+            raise StudyError(str(error)) from error
 
 
 def ask_about(folder: Path, index: int) -> None:
@@ -94,16 +92,18 @@ def ask_about(folder: Path, index: int) -> None:
     import torch
 
     from agents.explain.protocol import NotExplainableError, explainable
+    from leaderboard.replaying.recorded_agent import RetraceError
     from leaderboard.replaying.replay import ReplayError
-    from leaderboard.replaying.retracing import RetraceError
 
     run = read_run(folder / "rows" / "baseline")
     record = next(record for record in run.routes if record.index == index)
     env = retrace_env(run)
     agent = run_agent(run, env)
-    space = own_space(run, env)
+    space = seen_space(run.requires["observations"], env.config)
     edits = {
-        (target, dose): ObservationEditing(f"set:{target}={dose:g}", space)
+        (target, dose): ObservationEditing(
+            (SetValue(targets=tuple(target.split("+")), number=dose),), space
+        )
         for target in TARGETS
         for dose in DOSES_MPS
     }
@@ -150,15 +150,14 @@ def _keep(folder: Path, record: RouteRecord, rows: Sequence[Sequence[float]]) ->
             for place, target in enumerate(TARGETS)
         },
     }
-    (folder / FOLDER).mkdir(exist_ok=True)
-    replace_file(_path(folder, record), json.dumps(content, allow_nan=False) + "\n")
+    write_whole(_path(folder, record), one_line(content))
 
 
 def _kept(folder: Path, record: RouteRecord) -> Lengths | None:
     """What was asked of a drive before; None if nothing, or of another drive."""
     try:
-        content = json.loads(_path(folder, record).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(_path(folder, record))
+    except JsonError:
         return None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         return None
@@ -223,16 +222,14 @@ def _curve(
         found = effect([drive[target][dose] for drive in drives], routes)
         ends: tuple[float | None, float | None] = (None, None)
         if found.means is not None:
-            ends = interval(found.means, found.routes, ALPHA / 2.0)
+            ends = expanded_interval(found.means, found.routes, ALPHA / 2.0)
         curve["mean"].append(found.mean)
         curve["low"].append(ends[0])
         curve["high"].append(ends[1])
     return curve
 
 
-def _verdict(gain: Effect) -> Verdict:
-    if gain.low is None or gain.high is None:
-        return Verdict.UNDECIDED
-    if gain.low > gain.margin:
-        return Verdict.HOLDS
-    return Verdict.DOES_NOT_HOLD if gain.high < gain.margin else Verdict.UNDECIDED
+def _verdict(gain: Effect) -> ClaimVerdict:
+    return verdict_of_interval(
+        gain.low, gain.high, holds_above=gain.margin, fails_below=gain.margin
+    )

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from leaderboard.records.results import replace_file
-from leaderboard.studies.record import Drive, DrivenRow, Study
-from leaderboard.studies.rows import Row
-from leaderboard.studies.study_error import StudyError
+from di_envs.files.json_values import (
+    ForeignError,
+    JsonError,
+    by_lines,
+    compact,
+    from_json,
+    read_document,
+    to_json,
+)
+from di_envs.files.whole import write_whole
+from leaderboard.studies import StudyError
+from leaderboard.studies.record import DrivenRow, Study, StudyDrive
+from leaderboard.studies.rows import BASELINE, Row
 
 STUDY_FILE = "study.json"
-FORMAT, FORMAT_VERSION = "driveinsight-study", 1
-_DRIVE = tuple(part.name for part in dataclasses.fields(Drive))
+FORMAT, FORMAT_VERSION = "driveinsight-study", 2
+_DRIVE = tuple(part.name for part in dataclasses.fields(StudyDrive))
 
 
 def write_study(folder: Path, study: Study, findings: Mapping[str, Any] | None = None) -> None:
@@ -35,27 +44,15 @@ def write_study(folder: Path, study: Study, findings: Mapping[str, Any] | None =
         for part in dataclasses.fields(Study)
         if part.name not in ("rows", "extra")
     }
-    lines = [f" {json.dumps(name)}: {_compact(value)}" for name, value in head.items()]
-    lines.insert(0, f' "format": "{FORMAT}",\n "format_version": {FORMAT_VERSION}')
-    lines.append(f' "drive_columns": {_compact(_DRIVE)}')
-    rows = ",\n".join(f"  {_compact(_row_to_json(driven))}" for driven in study.rows)
-    lines.append(f' "rows": [\n{rows}\n ]')
-    lines.append(f' "extra": {_compact(study.extra)}')
-    lines.append(f' "findings": {_compact(findings or {})}')
+    rows = ",\n".join(f"  {compact(_row_to_json(driven))}" for driven in study.rows)
+    lines = {"format": compact(FORMAT), "format_version": compact(FORMAT_VERSION)}
+    lines |= {name: compact(value) for name, value in head.items()}
+    lines |= {"drive_columns": compact(_DRIVE), "rows": f"[\n{rows}\n ]"}
+    lines |= {"extra": compact(study.extra), "findings": compact(findings or {})}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_file(folder / STUDY_FILE, "{\n" + ",\n".join(lines) + "\n}\n")
+        write_whole(folder / STUDY_FILE, by_lines(lines))
     except OSError as error:
         raise StudyError(f"cannot write {folder / STUDY_FILE} ({error.strerror})") from error
-
-
-def as_read(study: Study) -> Study:
-    """The study as its file would be read: tuples within values are lists there."""
-    plain = {
-        name: json.loads(json.dumps(getattr(study, name)))
-        for name in ("requires", "options", "versions")
-    }
-    return dataclasses.replace(study, **plain)
 
 
 def read_study(path: Path) -> Study:
@@ -74,65 +71,68 @@ def read_study(path: Path) -> Study:
             "`driveinsight edit` wrote"
         )
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
+        return _study_from_json(read_document(path, FORMAT, FORMAT_VERSION), str(path))
+    except ForeignError as error:
         raise StudyError(
-            f"{path} is not whole JSON ({error}): remove it and repeat the command that made it; "
-            "what was driven is in rows/ and is not driven again"
+            f"{error}: give the folder of a study, read it with the version that wrote it, or "
+            "drive the study again"
         ) from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise StudyError(f"{path} is no record of a study (its format is not '{FORMAT}')")
-    if content.get("format_version") != FORMAT_VERSION:
+    except JsonError as error:
         raise StudyError(
-            f"{path} has format version {content.get('format_version')}, this program reads "
-            f"{FORMAT_VERSION}: read it with the version that wrote it, or drive the study again"
-        )
-    try:
-        return _study_from_json(content)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise StudyError(
-            f"{path} lacks or garbles a field ({error!r}): remove it and repeat the command that "
-            "made it; what was driven is in rows/ and is not driven again"
+            f"{error}: remove it and repeat the command that made it; what was driven is in rows/ "
+            "and is not driven again"
         ) from error
 
 
-def _study_from_json(content: Mapping[str, Any]) -> Study:
-    values = {part.name: content[part.name] for part in dataclasses.fields(Study)}
-    for name in ("interventions", "seeds"):
-        values[name] = tuple(values[name])
-    columns = tuple(content["drive_columns"])
+def _study_from_json(content: dict[str, Any], source: str) -> Study:
+    content.pop("findings", None)
+    columns = from_json(
+        tuple[str, ...], content.pop("drive_columns", None), source, "drive_columns"
+    )
     if set(columns) != set(_DRIVE):
-        raise ValueError(f"drives have the columns {', '.join(columns)}")
-    values["rows"] = tuple(_row_from_json(row, columns) for row in values["rows"])
-    study = Study(**values)
-    study.baseline  # noqa: B018 - every study has one: raises otherwise
-    return study
+        raise JsonError(
+            f"{source}: drive_columns: expected {', '.join(_DRIVE)}, got {', '.join(columns)}"
+        )
+    rows = from_json(tuple[_Row, ...], content.pop("rows", None), source, "rows", complete=True)
+    study = from_json(Study, {**content, "rows": []}, source, complete=True)
+    driven = tuple(
+        row.driven(columns, source, f"rows[{number}]") for number, row in enumerate(rows)
+    )
+    if not any(row.row.name == BASELINE for row in driven):
+        raise JsonError(f"{source}: rows: none is named '{BASELINE}'; every study has one")
+    return dataclasses.replace(study, rows=driven)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Row:
+    """A row as the file spells it: its drives are lists, in the order of `drive_columns`."""
+
+    name: str
+    edit: str
+    component: str
+    group: str
+    planned: int
+    left_out: str
+    wall_s: float  # of all drives together: for readers without this program
+    drives: tuple[tuple[Any, ...], ...]
+
+    def driven(self, columns: tuple[str, ...], source: str, at: str) -> DrivenRow:
+        """The row and its drives."""
+        for number, values in enumerate(self.drives):
+            if len(values) != len(columns):
+                raise JsonError(
+                    f"{source}: {at}.drives[{number}]: expected {len(columns)} values, "
+                    f"got {len(values)}"
+                )
+        named = [dict(zip(columns, values, strict=True)) for values in self.drives]
+        drives = from_json(tuple[StudyDrive, ...], named, source, f"{at}.drives", complete=True)
+        row = Row(name=self.name, edit=self.edit, component=self.component, group=self.group)
+        return DrivenRow(row=row, planned=self.planned, drives=drives, left_out=self.left_out)
 
 
 def _row_to_json(driven: DrivenRow) -> dict[str, Any]:
-    values = dataclasses.asdict(driven.row)
+    values: dict[str, Any] = to_json(driven.row)
     values |= {"planned": driven.planned, "left_out": driven.left_out}
     values["wall_s"] = driven.wall_s
     values["drives"] = [[getattr(drive, name) for name in _DRIVE] for drive in driven.drives]
     return values
-
-
-def _row_from_json(content: Mapping[str, Any], columns: tuple[str, ...]) -> DrivenRow:
-    row = Row(**{part.name: content[part.name] for part in dataclasses.fields(Row)})
-    drives = []
-    for numbers in content["drives"]:
-        drive = Drive(**dict(zip(columns, numbers, strict=True)))
-        for name in ("driving_score", "route_completion", "infraction_score", "wall_s", "done_m"):
-            if not isinstance(getattr(drive, name), int | float):
-                raise TypeError(f"{name} of a drive is no number: {getattr(drive, name)!r}")
-        drives.append(drive)
-    return DrivenRow(
-        row=row,
-        planned=content["planned"],
-        drives=tuple(drives),
-        left_out=content["left_out"],
-    )
-
-
-def _compact(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))

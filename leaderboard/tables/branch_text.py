@@ -8,6 +8,7 @@ from rich.table import Table
 
 from leaderboard.records.record import EventRecord, RouteRecord
 from leaderboard.replaying.branch import Branch
+from leaderboard.scoring.names import EVENT_NAMES
 
 
 def branch_tables(branch: Branch) -> Iterator[Table]:
@@ -56,4 +57,4 @@ def _after(record: RouteRecord, at_s: float) -> set[tuple[float, str]]:
 def _name(event: EventRecord) -> str:
     other = f" {event.other}" if event.other >= 0 else ""
     met = f" ({event.other_type}{other})" if event.other_type else other
-    return f"{event.kind.name.lower().replace('_', ' ')}{met}"
+    return f"{EVENT_NAMES[event.kind]}{met}"

@@ -1,4 +1,4 @@
-"""A comparison of two runs, or of two rule sets, as terminal tables."""
+"""A comparison of two runs as terminal tables."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
+from leaderboard.records.record import EventRecord
 from leaderboard.scoring.names import EVENT_NAMES
-from leaderboard.statistics.bootstrap import DifferenceInterval
+from leaderboard.statistics.bootstrap import FEW_ROUTES, BootstrapInterval
 from leaderboard.studies.comparing import SCORES, Comparison, Pair
+from leaderboard.tables.run_tables import plain_status
 
 _NAMES = {"driving_score": "DS", "route_completion": "RC", "infraction_score": "IS"}
 _DECIMALS = {"driving_score": 2, "route_completion": 2, "infraction_score": 3}
-FEW_ROUTES = 10  # fewer distinct ones make a bootstrap interval too narrow
 
 
 def comparison_tables(comparison: Comparison) -> Group:
@@ -48,14 +48,14 @@ def _score_table(comparison: Comparison) -> Table:
             _NAMES[score],
             f"{math.fsum(ours) / len(ours):.{digits}f}",
             f"{math.fsum(theirs) / len(theirs):.{digits}f}",
-            f"{interval.mean + 0.0:+.{digits}f}",
+            f"{interval.value + 0.0:+.{digits}f}",
             _interval_text(interval, digits),
             style="bold" if interval.clear else None,
         )
     return table
 
 
-def _interval_text(interval: DifferenceInterval, digits: int) -> str:
+def _interval_text(interval: BootstrapInterval, digits: int) -> str:
     if interval.low is None or interval.high is None:
         return "-"
     return f"{interval.low + 0.0:+.{digits}f} … {interval.high + 0.0:+.{digits}f}"
@@ -91,7 +91,7 @@ def _reasons(pair: Pair) -> str:
     if pair.new:
         parts.append(f"new: {', '.join(map(_event_text, pair.new))}")
     if pair.before.crashed != pair.after.crashed:
-        parts.append(f"{_plain(pair.before.status)}, then {_plain(pair.after.status)}")
+        parts.append(f"{plain_status(pair.before.status)}, then {plain_status(pair.after.status)}")
     if not parts:
         before, after = pair.before.score, pair.after.score
         if before.route_completion != after.route_completion:
@@ -104,12 +104,7 @@ def _reasons(pair: Pair) -> str:
 
 
 def _event_text(event: EventRecord) -> str:
-    name = EVENT_NAMES.get(event.kind, event.kind.name.lower().replace("_", " "))
-    return f"{name} ({event.time_s:.1f} s)"
-
-
-def _plain(status: str) -> str:
-    return status.removeprefix("Failed - ")
+    return f"{EVENT_NAMES[event.kind]} ({event.time_s:.1f} s)"
 
 
 def _caption(comparison: Comparison, changed: int) -> str:
@@ -129,45 +124,3 @@ def _caption(comparison: Comparison, changed: int) -> str:
     if comparison.unpaired:
         lines.append(f"Left out: {comparison.unpaired} that only one run has.")
     return "\n".join(lines)
-
-
-def rescoring_table(run: RunRecord, other: RunRecord) -> Table:
-    """The routes of one run under two rule sets, side by side, and their means."""
-    table = Table(
-        title=f"{escape(run.agent)} on {escape(run.suite)} · {run.rules} and {other.rules}",
-        title_justify="left",
-        title_style="bold",
-    )
-    table.add_column("route")
-    table.add_column("seed", justify="right")
-    for rules in (run.rules, other.rules):
-        for name in ("DS", "RC", "IS"):
-            table.add_column(f"{name}\n{rules.removeprefix('carla-')}", justify="right")
-    table.add_column("change of DS", justify="right")
-    pairs = list(zip(run.scored, other.scored, strict=True))
-    for ours, theirs in pairs:
-        change = theirs.score.driving_score - ours.score.driving_score
-        table.add_row(
-            escape(ours.route_id),
-            str(ours.seed),
-            *_score_cells([ours]),
-            *_score_cells([theirs]),
-            f"{change:+.1f}" if change else "",
-        )
-    table.add_section()
-    change = math.fsum(b.score.driving_score - a.score.driving_score for a, b in pairs)
-    table.add_row(
-        "mean",
-        "",
-        *_score_cells(run.scored),
-        *_score_cells(other.scored),
-        f"{change / len(pairs) + 0.0:+.2f}",
-        style="bold",
-    )
-    return table
-
-
-def _score_cells(records: Sequence[RouteRecord]) -> list[str]:
-    count = len(records)
-    means = [math.fsum(getattr(r.score, name) for r in records) / count for name in SCORES]
-    return [f"{means[0]:.1f}", f"{means[1]:.1f}", f"{means[2]:.3f}"]

@@ -1,69 +1,24 @@
-"""Responses by situation, the paper's sentences put to the test, and steady heads: as tables.
-
-The same rows make a terminal's table and Markdown.
-"""
+"""Responses by situation, the paper's sentences put to the test, and steady heads: as tables."""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
-from rich.markup import escape
-from rich.table import Table
-
 from agents.explain.situations import SAYS
+from di_envs.files.json_values import indented
+from di_envs.files.whole import write_whole
 from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined
-from leaderboard.responding.drive_responses import DriveResponses
+from leaderboard.responding.drive_responses import DriveResponses, plain_words
 from leaderboard.responding.heads import HeadConsistency, head_consistency, verdict_of_heads
-from leaderboard.statistics.resampling import Interval
+from leaderboard.responding.response_values import response_values
+from leaderboard.statistics.bootstrap import BootstrapInterval
+from leaderboard.tables.text_table import TextTable
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rows:
-    """A table before it is a picture.
-
-    Attributes:
-        title: Above it.
-        columns: Heads.
-        rows: Cells.
-        notes: Below it, a line each.
-        words: How many columns from the left hold words, not numbers.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
-    words: int = 1
-
-    def rich(self) -> Table:
-        """For a terminal."""
-        table = Table(
-            title=escape(self.title),
-            title_justify="left",
-            title_style="bold",
-            caption=escape("\n".join(self.notes)),
-            caption_justify="left",
-        )
-        for place, name in enumerate(self.columns):
-            table.add_column(escape(name), justify="left" if place < self.words else "right")
-        for row in self.rows:
-            table.add_row(*map(escape, row))
-        return table
-
-    def markdown(self) -> str:
-        """For a document."""
-        places = [":--" if place < self.words else "--:" for place in range(len(self.columns))]
-        lines = [f"### {self.title}", "", _line(self.columns), _line(places)]
-        lines += [_line(row) for row in self.rows]
-        return "\n".join([*lines, "", *(f"{note}  " for note in self.notes)]).rstrip() + "\n"
-
-
-def tables_of(drives: Sequence[DriveResponses]) -> list[Rows]:
+def tables_of(drives: Sequence[DriveResponses]) -> list[TextTable]:
     """All there is to say of drives of one policy; one drive tests nothing."""
     heads = head_consistency(drives)
     tables = [situation_rows(drives)]
@@ -73,41 +28,40 @@ def tables_of(drives: Sequence[DriveResponses]) -> list[Rows]:
 
 
 def write_tables(
-    folder: Path, drives: Sequence[DriveResponses], tables: Sequence[Rows]
+    folder: Path, drives: Sequence[DriveResponses], tables: Sequence[TextTable]
 ) -> tuple[Path, Path]:
     """Writes `responses.md` and `responses.json`.
 
     Raises:
         OSError: If they cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     text, numbers = folder / "responses.md", folder / "responses.json"
-    text.write_text("\n".join(table.markdown() for table in tables), encoding="utf-8")
-    values = as_values(drives, examined(drives), head_consistency(drives))
-    numbers.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(text, "\n".join(table.markdown() for table in tables))
+    values = response_values(drives, examined(drives), head_consistency(drives))
+    write_whole(numbers, indented(values))
     return text, numbers
 
 
-def situation_rows(drives: Sequence[DriveResponses]) -> Rows:
+def situation_rows(drives: Sequence[DriveResponses]) -> TextTable:
     """The strength of each component's response in each situation."""
     found, moments = by_situation(drives), moments_of(drives)
     names = [name for name in drives[0].situations if moments[name]]
-    return Rows(
+    return TextTable(
         title=f"Mean response by situation: {drives[0].name}",
-        columns=("component", *(f"{_plain(name)}\n{moments[name]} moments" for name in names)),
+        columns=("component", *(f"{plain_words(name)}\n{moments[name]} moments" for name in names)),
         rows=tuple(
-            (_plain(group), *(_give_or_take(cells[name]) for name in names))
+            (plain_words(group), *(_give_or_take(cells[name]) for name in names))
             for group, cells in found.items()
         ),
         notes=(
             "Length of (Gx, Gy), metres of the mean waypoint per unit of token, over "
             f"{len(drives)} drives of {_routes(drives)} distinct routes; ± half a 95 % interval.",
-            *(f"{_plain(name)}: {SAYS[name]}" for name in names if name in SAYS),
+            *(f"{plain_words(name)}: {SAYS[name]}" for name in names if name in SAYS),
         ),
     )
 
 
-def claim_rows(found: Sequence[Finding]) -> Rows:
+def claim_rows(found: Sequence[Finding]) -> TextTable:
     """The paper's sentences, each with its numbers and verdict."""
     level = 100.0 * (1.0 - (1.0 - LEVEL) / max(len(found), 1))
     sentences = list(dict.fromkeys((each.claim.sentence, each.claim.source) for each in found))
@@ -117,8 +71,8 @@ def claim_rows(found: Sequence[Finding]) -> Rows:
         rows.append(
             (
                 str(sentences.index((claim.sentence, claim.source)) + 1),
-                f"{_plain(claim.component)} {claim.kind}",
-                _plain(claim.when),
+                f"{plain_words(claim.component)} {claim.kind}",
+                plain_words(claim.when),
                 str(each.moments),
                 _ratio(each.strength),
                 each.verdict,
@@ -126,7 +80,7 @@ def claim_rows(found: Sequence[Finding]) -> Rows:
                 each.share_verdict,
             )
         )
-    return Rows(
+    return TextTable(
         title="The paper's sentences on responses, put to the test",
         columns=("", "tested", "when", "moments", "strength", "verdict", "share", "verdict"),
         rows=tuple(rows),
@@ -140,17 +94,17 @@ def claim_rows(found: Sequence[Finding]) -> Rows:
     )
 
 
-def head_rows(found: HeadConsistency) -> Rows:
+def head_rows(found: HeadConsistency) -> TextTable:
     """How steady the heads are, and what each attends to most."""
     layers, heads = found.heads.shape
-    return Rows(
+    return TextTable(
         title="Consistency of heads over time, and what each attends to most",
         columns=("", *(f"head {head}" for head in range(heads))),
         rows=tuple(
             (
                 f"layer {layer}",
                 *(
-                    f"{found.heads[layer, head]:.2f} {_plain(found.favourites[layer][head])}"
+                    f"{found.heads[layer, head]:.2f} {plain_words(found.favourites[layer][head])}"
                     for head in range(heads)
                 ),
             )
@@ -166,65 +120,15 @@ def head_rows(found: HeadConsistency) -> Rows:
     )
 
 
-def as_values(
-    drives: Sequence[DriveResponses], claims: Sequence[Finding], heads: HeadConsistency | None
-) -> Mapping[str, object]:
-    """All the numbers, as values that JSON has."""
-    return {
-        "agent": drives[0].agent,
-        "drives": [{"route": d.route_id, "seed": d.seed, "drive": d.drive} for d in drives],
-        "moments": dict(moments_of(drives)),
-        "by_situation": {
-            measure: {
-                group: {name: _values(cell) for name, cell in cells.items()}
-                for group, cells in by_situation(drives, measure).items()
-            }
-            for measure in ("Gx", "Gy", "strength", "share")
-        },
-        "claims": [
-            {
-                "component": each.claim.component,
-                "kind": each.claim.kind,
-                "when": each.claim.when,
-                "sentence": each.claim.sentence,
-                "source": each.claim.source,
-                "moments": each.moments,
-                "strength": {**_values(each.strength), "verdict": each.verdict},
-                "share": {**_values(each.share), "verdict": each.share_verdict},
-            }
-            for each in claims
-        ],
-        "heads": None
-        if heads is None
-        else {
-            "consistency": heads.heads.tolist(),
-            "favourites": [list(layer) for layer in heads.favourites],
-            "mean": _values(heads.mean),
-            "alike": _values(heads.alike),
-            "excess": _values(heads.excess),
-        },
-    }
-
-
-def _values(interval: Interval) -> dict[str, float | int | None]:
-    value = interval.value if math.isfinite(interval.value) else None
-    return {
-        "value": value,
-        "low": interval.low,
-        "high": interval.high,
-        "routes": interval.routes,
-    }
-
-
 def _routes(drives: Sequence[DriveResponses]) -> int:
     return len({drive.route_hash for drive in drives})
 
 
-def _mean(interval: Interval) -> str:
+def _mean(interval: BootstrapInterval) -> str:
     return _with_ends(interval, "{:.3g}")
 
 
-def _give_or_take(interval: Interval) -> str:
+def _give_or_take(interval: BootstrapInterval) -> str:
     """`2.74 ±0.26`: half the interval's width."""
     if not math.isfinite(interval.value):
         return "-"
@@ -233,11 +137,11 @@ def _give_or_take(interval: Interval) -> str:
     return f"{interval.value:.3g} ±{(interval.high - interval.low) / 2.0:.2g}"
 
 
-def _ratio(interval: Interval) -> str:
+def _ratio(interval: BootstrapInterval) -> str:
     return _with_ends(interval, "{:.2f}")
 
 
-def _with_ends(interval: Interval, form: str) -> str:
+def _with_ends(interval: BootstrapInterval, form: str) -> str:
     """`1.31 (1.20 … 1.42)`; the value alone where there are too few routes for ends."""
     if not math.isfinite(interval.value):
         return "-"
@@ -245,11 +149,3 @@ def _with_ends(interval: Interval, form: str) -> str:
     if interval.low is None or interval.high is None:
         return value
     return f"{value} ({form.format(interval.low)} … {form.format(interval.high)})"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("\n", ", ") for cell in cells) + " |"
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")

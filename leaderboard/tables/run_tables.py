@@ -11,11 +11,11 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from di_envs.rules import Rules, rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
-from leaderboard.scoring.rules import Rules, rules_named
 from leaderboard.scoring.score import count_infractions, infractions_per_km
-from leaderboard.statistics.confidence import Interval, mean_interval
+from leaderboard.statistics.confidence import MeanInterval, mean_interval
 
 
 def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int]) -> list[float]:
@@ -87,7 +87,7 @@ def _mean_cells(run: RunRecord) -> list[str]:
     ]
 
 
-def driving_interval(run: RunRecord) -> Interval:
+def driving_interval(run: RunRecord) -> MeanInterval:
     """The run's mean DS, with the t-interval of its means by seed."""
     return mean_interval(seed_means(run.scored, "driving_score", run.seeds))
 
@@ -120,13 +120,13 @@ def summary(records: Sequence[RouteRecord], rules: Rules) -> str:
     kinds = count_infractions((event.kind for r in driven for event in r.events), rules)
     parts = [f"{count} {EVENT_NAMES[kind]}" for kind, count in kinds.items() if count]
     crashes = Counter(record.status for record in driven if record.crashed)
-    parts += [f"{count} {_plain_status(status)}" for status, count in crashes.items()]
+    parts += [f"{count} {plain_status(status)}" for status, count in crashes.items()]
     lost = Counter(record.status for record in records if record.lost)
-    parts += [f"{count} lost ({_plain_status(status)})" for status, count in lost.items()]
+    parts += [f"{count} lost ({plain_status(status)})" for status, count in lost.items()]
     return ", ".join(parts)
 
 
-def _plain_status(status: str) -> str:
+def plain_status(status: str) -> str:
     """A status without the word that they share: `Worker died`."""
     return status.removeprefix("Failed - ")
 

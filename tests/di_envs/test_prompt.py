@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis.strategies import booleans, floats, integers
 
 from di_envs.observation import observation_space
-from di_envs.prompt import COMPONENTS, MAP_POLYLINES, OBSTACLES, empty_prompt, fill_speed_history
+from di_envs.prompt import COMPONENTS, MAP_POLYLINES, OBSTACLES, empty_prompt
+from di_envs.prompt_filling import fill_speed_history
 from di_envs.town.lanes import LaneKind, LightState, SignalKind
 from di_envs.town.map_chunks import POINTS, RANGE_M, MapKind, build_map_chunks
 from di_envs.town.plan import RoadOption

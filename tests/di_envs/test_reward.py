@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import composite, floats, integers, lists, sampled_from
 
-from di_envs.penalties import PENALTIES
+from di_envs.config import RouteEnvConfig
+from di_envs.course import load_course
 from di_envs.reward import Standing, infraction_penalty, reward_terms, score_metres
+from di_envs.rules import RULES
 from di_envs.world.state import EVENT_KINDS, EventKind
-from leaderboard.scoring.rules import RULES
 
+PENALTIES = {name: rules.penalties for name, rules in RULES.items()}
 RULES_1_0, RULES_2_0, RULES_2_1 = (PENALTIES[f"carla-{name}"] for name in ("1.0", "2.0", "2.1"))
 KINDS = RULES_2_0.scored
 
@@ -69,8 +71,10 @@ def test_the_terms_are_named_after_the_events():
     ]
 
 
-def test_the_penalties_are_those_that_the_leaderboard_scores_by():
-    assert {name: rules.penalties for name, rules in RULES.items()} == dict(PENALTIES)
+def test_the_reward_takes_what_the_rules_of_that_name_take():
+    for name, penalties in PENALTIES.items():
+        config = RouteEnvConfig(suite="town05_tiny", route_ids=("0",), rules=name)
+        assert load_course(config.changes()).penalties is penalties
 
 
 def test_an_infraction_in_the_sum_of_2_1_costs_less_the_more_there_were():

@@ -225,7 +225,7 @@ def test_the_reward_is_the_sum_of_its_terms_and_the_return_is_the_driving_score(
 
 
 def test_the_score_told_is_the_one_that_the_leaderboard_gives(env):
-    from leaderboard.scoring.rules import rules_named
+    from di_envs.rules import rules_named
     from leaderboard.scoring.score import Progress, score_route
 
     results = run(env, FULL_THROTTLE, seed=3)

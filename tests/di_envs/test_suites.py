@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from di_envs.suites import DATA, Suite, TrafficLevel, choose_suite, load_suite, suite_names
+from di_envs.suites import DATA, TrafficLevel, choose_suite, load_suite, read_suite, suite_names
 from di_envs.town.building.routes import build_short, build_tiny, build_toy, lit_junctions
 from di_envs.town.building.ways import lane_changes, lanes_driven, turns
 from di_envs.town.lanes import SignalKind, Turn
@@ -172,13 +173,27 @@ def test_unknown_names_are_refused_with_a_suggestion() -> None:
         load_suite("town05_lnog")
     with pytest.raises(ValueError, match="Unknown route id in suite 'toy' '77'"):
         load_suite("toy").specs(route_ids=["77"])
-    values = dataclasses.asdict(load_suite("toy"))
-    with pytest.raises(ValueError, match=r"'wether'; did you mean 'weather'\?"):
-        Suite.from_mapping({**values, "wether": "ClearNoon"})
-    with pytest.raises(ValueError, match="town missing"):
-        Suite.from_mapping({name: values[name] for name in values if name != "town"})
     with pytest.raises(ValueError, match="'vehicles' must be a whole number >= 0, got -1"):
         TrafficLevel(vehicles=-1, walkers=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"wether": "ClearNoon"}, r"unknown field 'wether'; did you mean 'weather'\?"),
+        ({"town": None}, "town: expected a text, got null"),
+        ({"weather": "ClearNun"}, "did you mean 'ClearNoon'"),
+        ({"traffic": {"vehicles": 3}}, r"traffic\.walkers: is missing"),
+        ({"traffic": {"vehicles": 3, "walkers": True}}, r"traffic\.walkers: expected a whole numb"),
+    ],
+)
+def test_a_wrong_suite_file_says_what_is_wrong(
+    tmp_path: Path, change: dict[str, object], says: str
+) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(dataclasses.asdict(load_suite("toy")) | change))
+    with pytest.raises(ValueError, match=rf"mine\.json: .*{says}"):
+        read_suite(path)
 
 
 def test_own_files_take_the_place_of_the_suites(shared: Path) -> None:

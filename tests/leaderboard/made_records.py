@@ -37,7 +37,7 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
     values = {
         "rules": "carla-1.0",
         "agent": "expert",
-        "agent_hash": "ee",
+        "agent_version": "ee",
         "track": "PRIVILEGED",
         "requires": {"observations": ["prompt"]},
         "suite": "town05_long",
@@ -47,7 +47,7 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
         "town_hash": "ff",
         "routes_hash": "gg",
         "seeds": (0, 1),
-        "versions": {"python": "3.11"},
+        "versions": {"python": "3.11", "numpy": "2.4.6", "world": "1"},
         "cpu": "generic",
         **fields,
     }

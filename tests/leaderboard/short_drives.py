@@ -7,14 +7,15 @@ from typing import Any
 
 from gymnasium.wrappers import TimeLimit
 
+from di_envs.rules import rules_named
 from di_envs.suites import load_suite
 from leaderboard.records.record import RunRecord
 from leaderboard.running.episode import drive_route
+from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.runner import new_run
 from leaderboard.running.setting_up import scene_of, set_up
 from leaderboard.running.wall_clock import Stopwatch
-from leaderboard.scoring.rules import rules_named
 
 
 def short_run(
@@ -23,14 +24,16 @@ def short_run(
     *,
     suite: str = "toy",
     route_id: str = "",
+    seed: int = 0,
     interventions: tuple[str, ...] = (),
     **options: Any,
 ) -> RunRecord:
     """A run of the first decisions of one route, the suite's first where none is named."""
     route_id = route_id or load_suite(suite).specs()[0].route_id
     options = {"suite": suite, "route_ids": (route_id,), **options}
-    spec = RunSpec(agent=agent, options=options, interventions=interventions)
-    job = Job(index=0, route_id=route_id, seed=0)
+    edits = read_interventions("; ".join(interventions))
+    spec = RunSpec(agent=agent, options=options, interventions=edits)
+    job = Job(index=0, route_id=route_id, seed=seed)
     with set_up(spec, Stopwatch()) as driver:
         scene = scene_of(driver)
         record = drive_route(

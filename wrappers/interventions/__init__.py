@@ -3,7 +3,8 @@
     from wrappers.interventions import InterventionWrapper
     env = InterventionWrapper(env, "drop:routing; noise:map,sigma=0.5@t>5")
 
-`docs/interventions.md` lists the edits; `edit.py` says what one is, `editing.py` applies them.
+`docs/interventions.md` lists the edits; `edit.py` says what one is, `editing.py` applies them,
+`eyes.py` is all that stands between what there is and what an agent sees.
 `parallel.py` is for the egos of a PettingZoo environment.
 """
 

@@ -1,7 +1,7 @@
 """Pinhole cameras: RGB, depth, semantic and instance images of the scene in one pass.
 
 A rig collects what stands round its ego once, and each of its cameras paints that
-(`camera_rows.py`). See `docs/conventions.md` for frames.
+(`rows.py`). See `docs/conventions.md` for frames.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class CameraRig:
 
     def _fresh(self, canvas: Canvas) -> Canvas:
         """The canvas with new arrays for what is handed out; the rest is used again and again."""
-        images: dict[str, NDArray[Any]] = {"rgb": np.empty_like(canvas.rgb)}
+        images: dict[str, Any] = {"rgb": np.empty_like(canvas.rgb)}
         if self.rig.depth:
             images["depth"] = np.empty_like(canvas.depth)
         if self.rig.semantic:

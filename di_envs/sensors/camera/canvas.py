@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt32
 from di_envs.numerics.bundles import by_reference
 from di_envs.sensors.camera.config import CameraConfig, Rig
-from di_envs.sensors.camera.projection import Projected
+from di_envs.sensors.camera.projection import Camera, Projected
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.scene.scene import Scene
 from di_envs.sensors.weather import Look
@@ -21,25 +21,24 @@ from di_envs.world.state import State
 class Canvas(NamedTuple):
     """One camera's images, and the row that is being worked on."""
 
-    mount: NDArray[np.float64]  # (9,) see place_camera
-    cam: NDArray[np.float64]  # (16,) its numbers at the moment
-    rgb: NDArray[np.uint8]  # (H, 3 W)
-    depth: NDArray[np.float32]  # (H, W)
-    tag: NDArray[np.uint8]  # (H, W), or (0, W) where it is not asked for
-    instance: NDArray[np.int32]  # alike
-    red: NDArray[np.float32]  # (W,)
-    green: NDArray[np.float32]
-    blue: NDArray[np.float32]
-    u: NDArray[np.float32]  # places in the raster
-    v: NDArray[np.float32]
-    samples: NDArray[np.float32]  # (4, W + 2) colours and water before they are spread
-    texel: NDArray[np.int32]  # (W + 2,) first one of four, in a level
-    share: NDArray[np.int32]  # (W + 2,) between them
-    found: NDArray[np.uint32]  # (4 W + 8,) texels
-    water: NDArray[np.float32]  # (W,) how deep it stands on the ground
-    shadow: NDArray[np.float32]
-    last: NDArray[np.uint8]
-    code: NDArray[np.int32]
+    cam: Camera
+    rgb: UInt8  # (H, 3 W)
+    depth: Float32  # (H, W)
+    tag: UInt8  # (H, W), or (0, W) where it is not asked for
+    instance: Int32  # alike
+    red: Float32  # (W,)
+    green: Float32
+    blue: Float32
+    u: Float32  # places in the raster
+    v: Float32
+    samples: Float32  # (4, W + 2) colours and water before they are spread
+    texel: Int32  # (W + 2,) first one of four, in a level
+    share: Int32  # (W + 2,) between them
+    found: UInt32  # (4 W + 8,) texels
+    water: Float32  # (W,) how deep it stands on the ground
+    shadow: Float32
+    last: UInt8
+    code: Int32
 
 
 @by_reference
@@ -56,15 +55,9 @@ class Studio(NamedTuple):
 def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
     """An empty canvas of a camera, with the images that the rig asks for."""
     height, width = camera.height, camera.width
-    beam = max(0.0, math.cos(camera.yaw_rad))
-    mount = (
-        camera.x_m, camera.y_m, camera.z_m, camera.yaw_rad, camera.pitch_rad,
-        camera.focal_px, width / 2.0, height / 2.0, beam,
-    )  # fmt: skip
     rows = [np.zeros(width + 2, np.float32) for _ in range(7)]
     return Canvas(
-        mount=np.array(mount, np.float64),
-        cam=np.zeros(16),
+        cam=_camera_of(camera),
         rgb=np.zeros((height, 3 * width), np.uint8),
         depth=np.zeros((height, width), np.float32),
         tag=np.zeros((height if rig.semantic else 0, width), np.uint8),
@@ -82,4 +75,25 @@ def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
         shadow=rows[5][:width],
         last=np.zeros(width, np.uint8),
         code=np.zeros(width, np.int32),
+    )
+
+
+def _camera_of(config: CameraConfig) -> Camera:
+    """A camera that is not in its place yet."""
+    axes = np.zeros((3, 3))
+    return Camera(
+        x_m=float(config.x_m),
+        y_m=float(config.y_m),
+        z_m=float(config.z_m),
+        yaw_rad=float(config.yaw_rad),
+        pitch_rad=float(config.pitch_rad),
+        focal_px=float(config.focal_px),
+        cx_px=config.width / 2.0,
+        cy_px=config.height / 2.0,
+        beam=max(0.0, math.cos(config.yaw_rad)),
+        eye=np.zeros(3),
+        axes=axes,
+        ahead=axes[0],
+        right=axes[1],
+        down=axes[2],
     )

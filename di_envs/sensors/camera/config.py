@@ -10,13 +10,14 @@ pitch lifts it. A point (a, r, u) ahead, right and up of the camera is seen at
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import numbers
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from di_envs.files.names import name_hint
 
 LARGEST_PX = 8192
 STEEPEST_RAD = math.radians(60.0)
@@ -188,10 +189,8 @@ def rig_of(cameras: str | Rig) -> Rig:
     if isinstance(cameras, Rig):
         return cameras
     if cameras not in RIGS:
-        near = difflib.get_close_matches(str(cameras), RIGS, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
         raise ValueError(
-            f"Unknown cameras {cameras!r}; {hint}known: {', '.join(RIGS)}, or give a "
+            f"Unknown cameras {cameras!r}; {name_hint(cameras, RIGS)}, or give a "
             f"di_envs.sensors.camera.config.Rig."
         )
     return RIGS[cameras]

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What is drawn over a finished image: the glow of lamps, and rain."""
 
 from __future__ import annotations
@@ -7,9 +6,12 @@ import math
 
 import numpy as np
 
+from di_envs.numerics.arrays import Float32, UInt8
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import keyed_hash
-from di_envs.sensors.scene.boxes import Material
+from di_envs.sensors.camera.projection import Camera, Projected
+from di_envs.sensors.scene.boxes import Boxes, Material
+from di_envs.world.state import State
 
 BLOOM_PX = 0.85  # least radius of a shining lamp: what is half a pixel wide is seen all the same
 FADE_M = 160.0  # where a lamp is no longer seen; it fades from half of that on
@@ -19,35 +21,54 @@ _STREAKS = 1.0 / 700.0  # of pixels, in the hardest rain
 
 
 @kernel
-def add_glow(boxes, seen, cam, depth, rgb):
-    """Draws every lamp that is seen as a disc of at least `BLOOM_PX`, with a faint halo."""
+def add_glow(boxes: Boxes, seen: Projected, cam: Camera, depth: Float32, rgb: UInt8) -> None:
+    """Draws every lamp that is seen as a disc of at least `BLOOM_PX`, with a faint halo.
+
+    Args:
+        boxes: What was collected round the ego.
+        seen: Which of them the camera sees.
+        cam: In its place.
+        depth: (H, W) of the image [m].
+        rgb: (H, 3 W) the image, drawn on.
+    """
     height, width = depth.shape
+    eye, axes = cam.eye, cam.axes
     for k in range(seen.count[0]):
         b = seen.source[k]
         if boxes.material[b] != _LAMP:
             continue
-        dx, dy = boxes.centre[b, 0] - cam[0], boxes.centre[b, 1] - cam[1]
-        dz = boxes.centre[b, 2] - cam[2]
+        dx, dy = boxes.centre[b, 0] - eye[0], boxes.centre[b, 1] - eye[1]
+        dz = boxes.centre[b, 2] - eye[2]
         if dx * math.cos(boxes.yaw[b]) + dy * math.sin(boxes.yaw[b]) <= 0.0:
             continue  # it shines the other way: its housing, thin as it is, hides it
-        ahead = dx * cam[3] + dy * cam[4] + dz * cam[5]
+        ahead = dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2]
         if ahead < 0.5:
             continue
-        x = cam[13] + cam[12] * (dx * cam[6] + dy * cam[7]) / ahead
-        y = cam[14] + cam[12] * (dx * cam[9] + dy * cam[10] + dz * cam[11]) / ahead
+        right = dx * axes[1, 0] + dy * axes[1, 1]  # the camera does not roll
+        down = dx * axes[2, 0] + dy * axes[2, 1] + dz * axes[2, 2]
+        x = cam.cx_px + cam.focal_px * right / ahead
+        y = cam.cy_px + cam.focal_px * down / ahead
         column, row = math.floor(x), math.floor(y)
         if not (0 <= column < width and 0 <= row < height):
             continue
         if depth[row, column] < ahead - 0.35:
             continue
-        size = np.float64(min(boxes.half[b, 1], boxes.half[b, 2])) * cam[12] / ahead
+        size = np.float64(min(boxes.half[b, 1], boxes.half[b, 2])) * cam.focal_px / ahead
         share = min(1.0, max(0.0, (FADE_M - ahead) / (0.5 * FADE_M)))
         _disc(x, y, size, share, boxes.colour[b], rgb)
 
 
 @kernel
-def _disc(x, y, size, strength, colour, rgb):
-    """Blends a disc of light of a size [px] and its halo into an image."""
+def _disc(x: float, y: float, size: float, strength: float, colour: Float32, rgb: UInt8) -> None:
+    """Blends a disc of light and its halo into an image.
+
+    Args:
+        x, y: Its middle [px].
+        size: Its radius [px].
+        strength: 0..1.
+        colour: (3,) what it shines, 0..1.
+        rgb: (H, 3 W) the image.
+    """
     radius = max(size, BLOOM_PX)
     halo = max(radius + 0.6, 2.0 * size)
     height, width = rgb.shape[0], rgb.shape[1] // 3
@@ -64,8 +85,15 @@ def _disc(x, y, size, strength, colour, rgb):
 
 
 @kernel
-def add_rain(state, key, rain, rgb):
-    """Draws streaks of rain, other ones in every tick and camera."""
+def add_rain(state: State, key: int, rain: float, rgb: UInt8) -> None:
+    """Draws streaks of rain, other ones in every tick and camera.
+
+    Args:
+        state: Of the world: its seed and tick count.
+        key: The camera's own.
+        rain: How hard it rains, 0..1.
+        rgb: (H, 3 W) the image, drawn on.
+    """
     height, width = rgb.shape[0], rgb.shape[1] // 3
     for drop in range(int(rain * width * height * _STREAKS * min(1.0, 400.0 / height))):
         draw = keyed_hash(state.seed[()], _RAIN, state.tick[()], key * 1000000 + drop)

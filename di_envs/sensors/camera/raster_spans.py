@@ -1,15 +1,16 @@
-# mypy: disallow_untyped_defs=False
 """Reading rasters of the ground, a span of pixels at a time.
 
 A bilinear sample is made in three passes, as the first and the last are pure arithmetic, which LLVM
-vectorises, and only the one between reads from places all over memory.
+vectorises, and only the one between reads from places all over memory. Slices are (N,), N samples.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt32
 from di_envs.numerics.kernels import kernel
+from di_envs.sensors.camera.spans import Axis
 
 F = np.float32
 ZERO, HALF = F(0.0), F(0.5)
@@ -19,27 +20,27 @@ _WHOLE = np.uint32(256)
 
 
 @kernel
-def plane_points(places, depth, stride, start, gain, turn, first):
+def plane_points(places: Float32, depth: Float32, stride: int, axis: Axis, first: F) -> None:
     """Where the rays of every `stride`-th pixel end, in texels along one axis.
 
     Args:
         places: (N,) written.
         depth: Of the row's pixels, from the span's first on.
         stride: Pixels from one place to the next.
-        start: Of the camera.
-        gain: What a metre of depth adds at column 0.
-        turn: What each column adds to that.
+        axis: In texels of the finest level.
         first: Column of the span's first pixel.
     """
     end = depth.shape[0] - 1
     for x in range(places.shape[0]):
         i = x * stride
         z = depth[i if i < end else end]
-        places[x] = start + z * (gain + (first + F(i)) * turn)
+        places[x] = axis.start + z * (axis.gain + (first + F(i)) * axis.turn)
 
 
 @kernel
-def texel_places(u, v, index, share, width, height, scale):
+def texel_places(
+    u: Float32, v: Float32, index: Int32, share: Int32, width: int, height: int, scale: F
+) -> None:
     """Which four texels of a level surround each place, and how near it is to each.
 
     Args:
@@ -67,8 +68,16 @@ def texel_places(u, v, index, share, width, height, scale):
 
 
 @kernel
-def fetch(index, found, texels, start, width):
-    """Reads four texels for each place, side by side into `found`, (4 N,)."""
+def fetch(index: Int32, found: UInt32, texels: UInt32, start: int, width: int) -> None:
+    """Reads four texels for each place, side by side into `found`, (4 N,).
+
+    Args:
+        index: (N,) as `texel_places` writes it.
+        found: (4 N,) or longer, written.
+        texels: Of all levels of a raster.
+        start: Where the level begins among them.
+        width: Of the level.
+    """
     first, below = np.uint64(start), np.uint64(width)
     for x in range(index.shape[0]):
         at = first + np.uint64(index[x])  # unsigned: what cannot be negative is not tested for it
@@ -79,8 +88,17 @@ def fetch(index, found, texels, start, width):
 
 
 @kernel
-def add_colours(found, share, red, green, blue, weight):
-    """Adds bilinear samples, made of what `fetch` found, to a span of colours."""
+def add_colours(
+    found: UInt32, share: Int32, red: Float32, green: Float32, blue: Float32, weight: F
+) -> None:
+    """Adds bilinear samples, made of what `fetch` found, to a span of colours.
+
+    Args:
+        found: (4 N,) or longer: four texels for each place.
+        share: (N,) as `texel_places` writes it.
+        red, green, blue: (N,) in levels, added to.
+        weight: Of the samples, 0..1.
+    """
     part = weight / F(256.0)
     for x in range(red.shape[0]):
         p, q = np.uint32(share[x] >> 4), np.uint32(share[x] & 15)
@@ -108,7 +126,7 @@ def add_colours(found, share, red, green, blue, weight):
 
 
 @kernel
-def water_depths(found, share, water, level):
+def water_depths(found: UInt32, share: Int32, water: Float32, level: F) -> None:
     """How deep water stands at each place, 0 to 2, if roads are under water up to a level 1 to 8.
 
     The nearest of the four texels says how low the place lies.
@@ -126,8 +144,10 @@ def water_depths(found, share, water, level):
 
 
 @kernel
-def last_bytes(u, v, last, texels, width, height):
-    """Reads the last byte of the nearest texel of the finest level."""
+def last_bytes(
+    u: Float32, v: Float32, last: UInt8, texels: UInt32, width: int, height: int
+) -> None:
+    """Reads the last byte of the nearest texel of the finest level, for places in texels."""
     for x in range(u.shape[0]):
         i, j = int(u[x]), int(v[x])
         i = i if i > 0 else 0
@@ -138,15 +158,21 @@ def last_bytes(u, v, last, texels, width, height):
 
 
 @kernel
-def tags_of(last, tag):
+def tags_of(last: UInt8, tag: UInt8) -> None:
     """The tags in texels' last bytes."""
     for x in range(last.shape[0]):
         tag[x] = last[x] & np.uint8(31)
 
 
 @kernel
-def spread(samples, colour, stride):
-    """Fills in a span from samples of every second, fourth or eighth pixel."""
+def spread(samples: Float32, colour: Float32, stride: int) -> None:
+    """Fills in a span from samples of every second, fourth or eighth pixel.
+
+    Args:
+        samples: ((N - 1) // stride + 2,): one more than there are, so that each has a next one.
+        colour: (N,) written: one channel, or depths of water.
+        stride: 2, 4 or 8 pixels from one sample to the next.
+    """
     whole = colour.shape[0] // stride
     if stride == 8:  # loops of a known length become straight vector code
         for k in range(whole):
@@ -168,8 +194,18 @@ def spread(samples, colour, stride):
 
 
 @kernel
-def puddles(water, red, green, blue, share, r, g, b):
-    """Covers the low places of a span with water that shows the sky."""
+def puddles(
+    water: Float32, red: Float32, green: Float32, blue: Float32, share: F, sky: tuple[F, F, F]
+) -> None:
+    """Covers the low places of a span with water that shows the sky.
+
+    Args:
+        water: (N,) depths, 0 to 2.
+        red, green, blue: (N,) in levels, covered.
+        share: Of the sky in what is under the deepest water.
+        sky: Its red, green and blue, in levels.
+    """
+    r, g, b = sky
     for x in range(water.shape[0]):
         k = share * HALF * water[x]
         red[x] += (r - red[x]) * k

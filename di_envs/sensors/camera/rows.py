@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """One camera's images, row by row: what each pixel shows, then its colour in runs of one face.
 
 Boxes are tested only on the spans of the rows that they may cover.
@@ -8,12 +7,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from di_envs.numerics.arrays import Float32, Int32, Int64
 from di_envs.numerics.kernels import kernel
+from di_envs.sensors.camera.canvas import Canvas, Studio
 from di_envs.sensors.camera.drops import add_glow, add_rain
 from di_envs.sensors.camera.face_shading import colour_face, colour_sky
 from di_envs.sensors.camera.ground_shading import colour_ground, shade_row
-from di_envs.sensors.camera.projection import place_camera, project_boxes, project_shadows
+from di_envs.sensors.camera.projection import Projected, place_camera, project_boxes
+from di_envs.sensors.camera.shadows import project_shadows
 from di_envs.sensors.camera.spans import (
+    BoxRays,
     beam_span,
     fill,
     hit_box,
@@ -30,30 +33,30 @@ F = np.float32
 
 
 @kernel
-def render(studio, canvas, ego, key):
+def render(studio: Studio, canvas: Canvas, ego: int, key: int) -> None:
     """Takes the images of one camera.
 
     Args:
-        studio: `Studio`; its boxes were collected before.
-        canvas: `Canvas` of the camera, written.
+        studio: Its boxes were collected before.
+        canvas: Of the camera, written.
         ego: The ego's index.
         key: The camera's own, for its own rain.
     """
     height, width = canvas.depth.shape
-    scene, look, seen = studio.scene, studio.look, studio.seen
-    place_camera(studio.state, ego, canvas.mount, canvas.cam)
-    project_boxes(canvas.cam, studio.boxes, look, width, height, seen)
-    project_shadows(canvas.cam, studio.boxes, look, scene.base_z[0], seen)
+    scene, look, seen, cam = studio.scene, studio.look, studio.seen, canvas.cam
+    place_camera(studio.state, ego, cam)
+    project_boxes(cam, studio.boxes, look, width, height, seen)
+    project_shadows(cam, studio.boxes, look, scene.base_z[0], seen)
     start, boxes = _rows_of_boxes(seen, height)
     for y in range(height):
         _row(studio, canvas, y, boxes[start[y] : start[y + 1]])
-    add_glow(studio.boxes, seen, canvas.cam, canvas.depth, canvas.rgb)
-    if look.numbers[4] > 0.0:
-        add_rain(studio.state, key, look.numbers[4], canvas.rgb)
+    add_glow(studio.boxes, seen, cam, canvas.depth, canvas.rgb)
+    if look.rain > 0.0:
+        add_rain(studio.state, key, look.rain, canvas.rgb)
 
 
 @kernel
-def _rows_of_boxes(seen, height):
+def _rows_of_boxes(seen: Projected, height: int) -> tuple[Int64, Int32]:
     """Which boxes each row has to test: row y those from start[y] to start[y + 1]."""
     start = np.zeros(height + 1, np.int64)
     for k in range(seen.count[0]):
@@ -71,13 +74,13 @@ def _rows_of_boxes(seen, height):
 
 
 @kernel
-def _row(studio, canvas, y, boxes):
-    """Takes one row of pixels, on which these boxes may be."""
-    cam, seen, look = canvas.cam, studio.seen, studio.look
+def _row(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> None:
+    """Takes row y of pixels, on which these boxes may be, by their numbers among those seen."""
+    cam = canvas.cam
     depth = canvas.depth[y]
-    v = (y + 0.5 - cam[14]) / cam[12]
-    drop = cam[5] + v * cam[11]  # of the ray, upwards, for 1 ahead
-    above = cam[2] - studio.scene.base_z[0]
+    v = (y + 0.5 - cam.cy_px) / cam.focal_px  # how far down the row's rays go, 1 ahead
+    drop = cam.ahead[2] + v * cam.down[2]  # of the rays, upwards, 1 ahead
+    above = cam.eye[2] - studio.scene.base_z[0]
     far = -above / drop if drop < -1e-6 else FAR_M
     ground = 0.0 < far < FAR_M
     fill(depth, F(far if ground else FAR_M))
@@ -85,9 +88,6 @@ def _row(studio, canvas, y, boxes):
     low, high = _hit_boxes(studio, canvas, y, boxes)
     if ground:
         shade_row(studio, canvas, v, far)
-    with_tag, with_who = canvas.tag.shape[0] > 0, canvas.instance.shape[0] > 0
-    tag = canvas.tag[y] if with_tag else canvas.last
-    who = canvas.instance[y] if with_who else canvas.code
     x, width = 0, depth.shape[0]
     while x < width:
         code = canvas.code[x]
@@ -97,33 +97,64 @@ def _row(studio, canvas, y, boxes):
             if end == high and code < 0:
                 end = width
         if code < 0:
-            if with_who:
-                fill(who[x:end], np.int32(0))
-            if ground:
-                colour_ground(studio, canvas, x, end, y, far, drop, tag)
-            else:
-                colour_sky(canvas, look, x, end, drop)
-                if with_tag:
-                    fill(tag[x:end], np.uint8(_SKY))
+            _colour_open(studio, canvas, x, end, y, drop, far if ground else 0.0)
         else:
-            source = seen.source[code // 6]
-            if with_who:
-                fill(who[x:end], studio.boxes.instance[source])
-            if with_tag:
-                fill(tag[x:end], studio.boxes.tag[source])
-            colour_face(studio, canvas, code, x, end, y, tag)
+            _colour_box(studio, canvas, code, x, end, y)
         x = end
-    if cam[15] > 0.0 and look.numbers[5] > 0.0:
-        u0, du = F((0.5 - cam[13]) / cam[12]), F(1.0 / cam[12])
-        beam_span(canvas.shadow, depth, F(6.0 * cam[15]), u0, du)
-        multiply(canvas.red, canvas.shadow)
-        multiply(canvas.green, canvas.shadow)
-        multiply(canvas.blue, canvas.shadow)
+    if cam.beam > 0.0 and studio.look.night > 0:
+        _shine(canvas, depth)
     store_row(canvas.red, canvas.green, canvas.blue, canvas.rgb[y])
 
 
 @kernel
-def _hit_boxes(studio, canvas, y, boxes):
+def _colour_open(
+    studio: Studio, canvas: Canvas, a: int, b: int, y: int, drop: float, far: float
+) -> None:
+    """Colours the pixels [a, b) of row y, on which no box is.
+
+    Args:
+        studio: All that the picture is made from.
+        canvas: Painted on.
+        a, b, y: The pixels.
+        drop: How the row's rays rise, 1 ahead.
+        far: Depth of the ground [m], 0 where the sky is.
+    """
+    if canvas.instance.shape[0] > 0:
+        fill(canvas.instance[y, a:b], np.int32(0))
+    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.last
+    if far > 0.0:
+        colour_ground(studio, canvas, a, b, y, far, drop, tag)
+        return
+    colour_sky(canvas, studio.look, a, b, drop)
+    if canvas.tag.shape[0] > 0:
+        fill(tag[a:b], np.uint8(_SKY))
+
+
+@kernel
+def _colour_box(studio: Studio, canvas: Canvas, code: int, a: int, b: int, y: int) -> None:
+    """Colours the pixels [a, b) of row y, all of one face, `code` as in `colour_face`."""
+    source = studio.seen.source[code // 6]
+    if canvas.instance.shape[0] > 0:
+        fill(canvas.instance[y, a:b], studio.boxes.instance[source])
+    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.last
+    if canvas.tag.shape[0] > 0:
+        fill(tag[a:b], studio.boxes.tag[source])
+    colour_face(studio, canvas, code, a, b, y, tag)
+
+
+@kernel
+def _shine(canvas: Canvas, depth: Float32) -> None:
+    """Brightens a row of depths (W,) by the ego's own headlights."""
+    cam = canvas.cam
+    u0, du = F((0.5 - cam.cx_px) / cam.focal_px), F(1.0 / cam.focal_px)
+    beam_span(canvas.shadow, depth, F(6.0 * cam.beam), u0, du)
+    multiply(canvas.red, canvas.shadow)
+    multiply(canvas.green, canvas.shadow)
+    multiply(canvas.blue, canvas.shadow)
+
+
+@kernel
+def _hit_boxes(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> tuple[int, int]:
     """Finds the nearest face at each pixel of a row; returns the columns that boxes may cover."""
     seen, row = studio.seen, F(y)
     low, high = canvas.code.shape[0], 0
@@ -132,18 +163,29 @@ def _hit_boxes(studio, canvas, y, boxes):
         k = boxes[n]
         a, b = seen.rect[k, 0], seen.rect[k, 1]
         low, high = min(low, a), max(high, b)
-        ray, half = seen.ray[k], studio.boxes.half[seen.source[k]]
-        at_row_x, at_row_y = ray[3] + row * ray[9], ray[4] + row * ray[10]
-        if studio.boxes.pitch[seen.source[k]] == F(0.0):
-            hit_upright(
-                depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), ray[0], ray[1], ray[2],
-                at_row_x, at_row_y, ray[5] + row * ray[11], ray[6], ray[7],
-                half[0], half[1], half[2],
-            )  # fmt: skip
+        box = seen.source[k]
+        rays = _rays_of_row(seen.rays[k], row, studio.boxes.half[box])
+        if studio.boxes.pitch[box] == F(0.0):
+            hit_upright(depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), rays)
         else:
-            hit_box(
-                depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), ray[0], ray[1], ray[2],
-                at_row_x, at_row_y, ray[5] + row * ray[11], ray[6], ray[7], ray[8],
-                half[0], half[1], half[2],
-            )  # fmt: skip
+            hit_box(depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), rays)
     return low, high
+
+
+@kernel
+def _rays_of_row(rays: Float32, row: F, half: Float32) -> BoxRays:
+    """The rays of one row, from a box's `Projected.rays` (4, 3) and its half sides (3,)."""
+    return BoxRays(
+        rays[0, 0],
+        rays[0, 1],
+        rays[0, 2],
+        rays[1, 0] + row * rays[3, 0],
+        rays[1, 1] + row * rays[3, 1],
+        rays[1, 2] + row * rays[3, 2],
+        rays[2, 0],
+        rays[2, 1],
+        rays[2, 2],
+        half[0],
+        half[1],
+        half[2],
+    )

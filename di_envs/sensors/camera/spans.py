@@ -1,15 +1,18 @@
-# mypy: disallow_untyped_defs=False
 """The innermost loops of the cameras: small functions over slices of one row of pixels.
 
 Each works on contiguous single-precision slices from 0 on and calls nothing, which is what lets
 LLVM vectorise it. Colours are in levels (0..255) until `store_row`. `depth` is metres ahead of the
-camera's plane; a pixel's place along the row is `first + index`.
+camera's plane; a pixel's place along the row is `first + index`. Slices are (N,), N pixels long.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from di_envs.numerics.arrays import Float32, Int32, UInt8
 from di_envs.numerics.kernels import kernel
 
 F = np.float32
@@ -17,8 +20,36 @@ ONE, ZERO, HALF, FULL = F(1.0), F(0.0), F(0.5), F(255.0)
 NEAR_M = F(0.1)
 
 
+class BoxRays(NamedTuple):
+    """The rays of one row of pixels and the box that they are tested against, in its frame [m].
+
+    The ray of column k goes from the eye along `start + k step`, which is 1 ahead of the camera.
+    """
+
+    eye_x: F
+    eye_y: F
+    eye_z: F
+    start_x: F
+    start_y: F
+    start_z: F
+    step_x: F
+    step_y: F
+    step_z: F
+    half_x: F  # half sides of the box
+    half_y: F
+    half_z: F
+
+
+class Axis(NamedTuple):
+    """Where rays end along one axis: at `start + depth (gain + column turn)`."""
+
+    start: F  # of the camera
+    gain: F  # what a metre of depth adds at column 0
+    turn: F  # what each column adds to that
+
+
 @kernel
-def hit_box(depth, code, first, box, rx, ry, rz, ax, ay, az, bx, by, bz, hx, hy, hz):
+def hit_box(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays) -> None:
     """Intersects a span of rays with one box; the nearer hit stays.
 
     Args:
@@ -26,12 +57,13 @@ def hit_box(depth, code, first, box, rx, ry, rz, ax, ay, az, bx, by, bz, hx, hy,
         code: (N,) what it was: 6 times the box's number and the face.
         first: Column of the span's first pixel.
         box: 6 times the box's number.
-        rx, ry, rz: Camera in the box's frame [m].
-        ax, ay, az: Ray of column 0 in the box's frame, 1 ahead.
-        bx, by, bz: What each column adds to it.
-        hx, hy, hz: Half sides of the box.
+        rays: Of the row.
     """
-    nx, px, ny, py, nz, pz = -hx - rx, hx - rx, -hy - ry, hy - ry, -hz - rz, hz - rz
+    nx, px = -rays.half_x - rays.eye_x, rays.half_x - rays.eye_x
+    ny, py = -rays.half_y - rays.eye_y, rays.half_y - rays.eye_y
+    nz, pz = -rays.half_z - rays.eye_z, rays.half_z - rays.eye_z
+    ax, ay, az = rays.start_x, rays.start_y, rays.start_z
+    bx, by, bz = rays.step_x, rays.step_y, rays.step_z
     for x in range(depth.shape[0]):
         at = F(x) + first
         old = depth[x]
@@ -61,15 +93,14 @@ def hit_box(depth, code, first, box, rx, ry, rz, ax, ay, az, bx, by, bz, hx, hy,
 
 
 @kernel
-def hit_upright(depth, code, first, box, rx, ry, rz, ax, ay, dz, bx, by, hx, hy, hz):
-    """`hit_box` for a box without pitch: a row's rays rise alike at every column.
-
-    Args:
-        dz: How much they rise, 1 ahead; the rest is as for `hit_box`.
-    """
-    nx, px, ny, py = -hx - rx, hx - rx, -hy - ry, hy - ry
+def hit_upright(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays) -> None:
+    """`hit_box` for a box without pitch: a row's rays rise alike at every column."""
+    nx, px = -rays.half_x - rays.eye_x, rays.half_x - rays.eye_x
+    ny, py = -rays.half_y - rays.eye_y, rays.half_y - rays.eye_y
+    ax, ay, dz = rays.start_x, rays.start_y, rays.start_z
+    bx, by = rays.step_x, rays.step_y
     iz = ONE / dz
-    z1, z2 = (-hz - rz) * iz, (hz - rz) * iz
+    z1, z2 = (-rays.half_z - rays.eye_z) * iz, (rays.half_z - rays.eye_z) * iz
     in_z = z1 if z1 < z2 else z2
     out_z = z2 if z1 < z2 else z1
     face_z = np.int32(4) + np.int32(dz >= ZERO)
@@ -98,22 +129,30 @@ def hit_upright(depth, code, first, box, rx, ry, rz, ax, ay, dz, bx, by, hx, hy,
 
 
 @kernel
-def fill(values, value):
+def fill(values: NDArray[Any], value: Any) -> None:
     """Sets a span to one value."""
     for x in range(values.shape[0]):
         values[x] = value
 
 
 @kernel
-def light_ground(colour, shadow, lit, dark, add):
+def light_ground(colour: Float32, shadow: Float32, lit: F, dark: F, add: F) -> None:
     """Lights one channel of a span of ground: by `lit`, in shadow by `dark`, and adds haze."""
     for x in range(colour.shape[0]):
         colour[x] = colour[x] * (lit + (dark - lit) * shadow[x]) + add
 
 
 @kernel
-def shade_span(shadow, first, start, end, strength):
-    """Marks a stretch of a row as in shadow, its ends softened over a pixel."""
+def shade_span(shadow: Float32, first: F, start: F, end: F, strength: F) -> None:
+    """Marks a stretch of a row as in shadow, its ends softened over a pixel.
+
+    Args:
+        shadow: (N,) how much of the sun is hidden, 0..1; only ever raised.
+        first: Column of the span's first pixel.
+        start: Column at which the shadow begins, between pixels too.
+        end: Column at which it ends.
+        strength: 0..1, less for what is thinner than a pixel.
+    """
     for x in range(shadow.shape[0]):
         at = first + F(x)
         a, b = at - start + HALF, end - at + HALF
@@ -123,8 +162,8 @@ def shade_span(shadow, first, start, end, strength):
 
 
 @kernel
-def flat(colour, depth, haze, value, sky):
-    """One channel of a plain face, in haze."""
+def flat(colour: Float32, depth: Float32, haze: F, value: F, sky: F) -> None:
+    """One channel of a plain face of colour `value`, behind `haze` [1/m] of colour `sky`."""
     for x in range(depth.shape[0]):
         k = haze * depth[x]
         w = ONE / (ONE + k + HALF * k * k)
@@ -132,21 +171,21 @@ def flat(colour, depth, haze, value, sky):
 
 
 @kernel
-def windows(pattern, depth, first, q0, qa, qb, p0, pa, pb, pixel):
+def windows(pattern: Float32, depth: Float32, first: F, along: Axis, up: Axis, pixel: F) -> None:
     """How much of each pixel of a wall is window, 0..1.
 
     Args:
         pattern: (N,) written.
         depth: (N,) of the wall.
         first: Column of the first pixel.
-        q0, qa, qb: Place along the wall: q0 + depth (qa + column qb).
-        p0, pa, pb: Height on the wall alike.
+        along: Place along the wall [m].
+        up: Height on the wall [m].
         pixel: Metres a pixel at 1 m.
     """
     for x in range(depth.shape[0]):
         at = F(x) + first
-        q = (q0 + depth[x] * (qa + at * qb)) / F(2.8)
-        p = (p0 + depth[x] * (pa + at * pb)) / F(3.2)
+        q = (along.start + depth[x] * (along.gain + at * along.turn)) / F(2.8)
+        p = (up.start + depth[x] * (up.gain + at * up.turn)) / F(3.2)
         q -= np.floor(q)
         p -= np.floor(p)
         blur = depth[x] * pixel / F(2.8) + F(0.02)
@@ -162,13 +201,17 @@ def windows(pattern, depth, first, q0, qa, qb, p0, pa, pb, pixel):
 
 
 @kernel
-def mottle(pattern, depth, first, q0, qa, qb, p0, pa, pb, s0, sa, sb, pixel):
-    """How bright the leaves are at each pixel, around 1. Arguments as for `windows`, s across."""
+def mottle(
+    pattern: Float32, depth: Float32, first: F, along: Axis, up: Axis, across: Axis, pixel: F
+) -> None:
+    """How bright the leaves are at each pixel, around 1. Arguments as for `windows`."""
     for x in range(depth.shape[0]):
         at = F(x) + first
-        q = np.int64(np.floor((q0 + depth[x] * (qa + at * qb)) * F(2.7)))
-        p = np.int64(np.floor((p0 + depth[x] * (pa + at * pb)) * F(2.7)))
-        s = np.int64(np.floor((s0 + depth[x] * (sa + at * sb)) * F(2.7)))
+        q = np.int64(np.floor((along.start + depth[x] * (along.gain + at * along.turn)) * F(2.7)))
+        p = np.int64(np.floor((up.start + depth[x] * (up.gain + at * up.turn)) * F(2.7)))
+        s = np.int64(
+            np.floor((across.start + depth[x] * (across.gain + at * across.turn)) * F(2.7))
+        )
         h = (q * 73856093) ^ (p * 19349663) ^ (s * 83492791)
         h = (((h & 0xFFFFFF) * 40503) >> 12) & 255
         fade = F(1.3) - depth[x] * pixel * F(2.5)
@@ -178,22 +221,22 @@ def mottle(pattern, depth, first, q0, qa, qb, p0, pa, pb, s0, sa, sb, pixel):
 
 
 @kernel
-def blend(colour, pattern, other):
-    """Mixes another value into a channel, by a pattern."""
+def blend(colour: Float32, pattern: Float32, other: F) -> None:
+    """Mixes another value into a channel, by a pattern of shares 0..1."""
     for x in range(colour.shape[0]):
         colour[x] += (other - colour[x]) * pattern[x]
 
 
 @kernel
-def multiply(colour, pattern):
+def multiply(colour: Float32, pattern: Float32) -> None:
     """Multiplies a channel by a pattern."""
     for x in range(colour.shape[0]):
         colour[x] *= pattern[x]
 
 
 @kernel
-def haze_span(colour, depth, haze, light, sky):
-    """Lights one channel of a textured face and hides it in haze."""
+def haze_span(colour: Float32, depth: Float32, haze: F, light: F, sky: F) -> None:
+    """Lights one channel of a textured face and hides it in `haze` [1/m] of colour `sky`."""
     for x in range(depth.shape[0]):
         k = haze * depth[x]
         w = ONE / (ONE + k + HALF * k * k)
@@ -201,8 +244,8 @@ def haze_span(colour, depth, haze, light, sky):
 
 
 @kernel
-def store_row(red, green, blue, row):
-    """Writes a row of colours as bytes."""
+def store_row(red: Float32, green: Float32, blue: Float32, row: UInt8) -> None:
+    """Writes N colours as bytes to a row of an image, (3 N,)."""
     for x in range(red.shape[0]):
         r, g, b = red[x], green[x], blue[x]
         r = r if r < FULL else FULL
@@ -214,8 +257,16 @@ def store_row(red, green, blue, row):
 
 
 @kernel
-def beam_span(factor, depth, gain, u0, du):
-    """By how much each pixel is brighter that stands in the ego's own beam."""
+def beam_span(factor: Float32, depth: Float32, gain: F, u0: F, du: F) -> None:
+    """By how much each pixel is brighter that stands in the ego's own beam.
+
+    Args:
+        factor: (N,) written, from 1 up.
+        depth: (N,) of the whole row.
+        gain: Right before the headlights.
+        u0: How far to the right a ray of the first pixel goes, 1 ahead.
+        du: What each column adds to it.
+    """
     for x in range(depth.shape[0]):
         z = depth[x]
         side = (u0 + F(x) * du) * z / (F(2.2) + F(0.22) * z)
@@ -224,7 +275,7 @@ def beam_span(factor, depth, gain, u0, du):
 
 
 @kernel
-def run_end(code, start, end):
+def run_end(code: Int32, start: int, end: int) -> int:
     """Where the run of equal codes that begins at `start` is over; at `end`, if not before."""
     value = code[start]
     x = start + 1

@@ -15,9 +15,10 @@ CARLA's own default range is 10 m, which sees less than a crossing: all presets 
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
+
+from di_envs.files.names import name_hint
 
 LARGEST_SIDE = 8192
 SWEEP_S = 0.1  # time of a turn, as the Leaderboard sets it
@@ -121,10 +122,8 @@ def lidar_of(lidar: str | LidarConfig) -> LidarConfig:
     if isinstance(lidar, LidarConfig):
         return lidar
     if lidar not in LIDARS:
-        near = difflib.get_close_matches(str(lidar), LIDARS, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
         raise ValueError(
-            f"Unknown lidar {lidar!r}; {hint}known: {', '.join(LIDARS)}, or give a "
+            f"Unknown lidar {lidar!r}; {name_hint(lidar, LIDARS)}, or give a "
             f"di_envs.sensors.lidar.config.LidarConfig."
         )
     return LIDARS[lidar]

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """LiDAR: a sweep of rays against the same scene that cameras show.
 
 A LiDAR turns ten times a second. An observer that looks at every world tick, twice a turn, gets
@@ -6,8 +5,7 @@ just the half that was scanned in it: the first half of the steps (ahead, to the
 odd ticks, the second at even ones. Both have `(steps + 1) // 2` steps, so where a sweep's number is
 odd both hold the one in the middle. An observer that looks less often gets whole sweeps.
 
-`docs/conventions.md` has the frames; `lidar_rays.py` the rays, `lidar_points.py` what is made of
-them.
+`docs/conventions.md` has the frames; `rays.py` the rays, `points.py` what is made of them.
 """
 
 from __future__ import annotations
@@ -18,10 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float32, UInt8
 from di_envs.numerics.kernels import bind, kernel
 from di_envs.sensors.lidar.config import LidarConfig
 from di_envs.sensors.lidar.points import write_points, write_tags
 from di_envs.sensors.lidar.rays import Sweep, meet_boxes, meet_ground
+from di_envs.sensors.lidar.window import LidarPose
 from di_envs.sensors.scene.scene import Scene, box_buffer, collect_boxes, scene_of
 from di_envs.town.town import Town
 from di_envs.world.state import State
@@ -29,30 +29,32 @@ from di_envs.world.world import WorldView
 
 
 @kernel
-def sweep_rays(sweep, ego, points, tags):
+def sweep_rays(sweep: Sweep, ego: int, points: Float32, tags: UInt8) -> None:
     """Takes a sweep.
 
     Args:
-        sweep: `Sweep`; its boxes were collected before.
+        sweep: Its boxes were collected before.
         ego: The ego's index.
         points: (K, C, 4) written: x, y, z [m] in the ego's frame and intensity, or zeros. K is the
             number of steps, or that of `half_steps`: then of the half that this tick scans.
         tags: (K, C) written: `Tag`; or (0, C) where it is not asked for.
     """
-    state, numbers = sweep.state, sweep.numbers
-    yaw = state.yaw[ego]
-    c, s = math.cos(yaw), math.sin(yaw)
-    x = state.x[ego] + c * numbers[0] - s * numbers[1]
-    y = state.y[ego] + s * numbers[0] + c * numbers[1]
-    z = state.z[ego] + numbers[2]
+    state = sweep.state
+    c, s = math.cos(state.yaw[ego]), math.sin(state.yaw[ego])
+    pose = LidarPose(
+        state.x[ego] + c * sweep.x_m - s * sweep.y_m,
+        state.y[ego] + s * sweep.x_m + c * sweep.y_m,
+        state.z[ego] + sweep.z_m,
+        state.yaw[ego],
+    )
     scan = points.shape[0]
     sweep.scan[0] = sweep.turn.shape[0] - scan if sweep.state.tick[()] % 2 == 0 else 0
     sweep.scan[1] = sweep.scan[0] + scan
-    meet_ground(sweep, z - sweep.scene.base_z[0])
-    meet_boxes(sweep, x, y, z, yaw)
+    meet_ground(sweep, pose.z - sweep.scene.base_z[0])
+    meet_boxes(sweep, pose)
     write_points(sweep, ego, points)
     if tags.shape[0] > 0:
-        write_tags(sweep, x, y, z, c, s, points, tags)
+        write_tags(sweep, pose, tags)
 
 
 class Lidar:
@@ -102,10 +104,6 @@ class Lidar:
 
 
 def _sweep(config: LidarConfig, state: State, scene: Scene) -> Sweep:
-    numbers = (
-        config.x_m, config.y_m, config.z_m, config.range_m, config.attenuation_per_m,
-        config.dropoff, config.dropoff_intensity, config.dropoff_zero, config.noise_m,
-    )  # fmt: skip
     elevation = np.radians(np.linspace(config.upper_deg, config.lower_deg, config.channels))
     elevation = np.where(np.abs(elevation) < 1e-7, -1e-7, elevation)  # level, but no 0 / 0
     azimuth = 2.0 * np.pi * np.arange(config.steps) / config.steps
@@ -114,7 +112,15 @@ def _sweep(config: LidarConfig, state: State, scene: Scene) -> Sweep:
         state=state,
         scene=scene,
         boxes=box_buffer(),
-        numbers=np.array(numbers, np.float64),
+        x_m=float(config.x_m),
+        y_m=float(config.y_m),
+        z_m=float(config.z_m),
+        range_m=float(config.range_m),
+        attenuation_per_m=float(config.attenuation_per_m),
+        dropoff=float(config.dropoff),
+        dropoff_intensity=float(config.dropoff_intensity),
+        dropoff_zero=float(config.dropoff_zero),
+        noise_m=float(config.noise_m),
         tangent=np.tan(elevation),
         sine=np.sin(elevation).astype(np.float32),
         cosine=np.cos(elevation).astype(np.float32),

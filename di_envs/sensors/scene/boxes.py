@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Boxes: what stands on the ground, as arrays that cameras and LiDAR read alike.
 
 A box is turned by its yaw and then tilted by its pitch (positive lifts its front, for decks of
@@ -85,7 +84,7 @@ def boxes_of(specs: Sequence[BoxSpec]) -> Boxes:
 
 
 @kernel
-def copy_box(source, row, target):
+def copy_box(source: Boxes, row: int, target: Boxes) -> None:
     """Appends a box to others; one that finds no room is left out."""
     at = target.count[0]
     if at >= target.yaw.shape[0]:

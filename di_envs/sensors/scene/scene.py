@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The scene: what stands where, for cameras and LiDAR alike, so that they never disagree.
 
 `scene_of(town)` builds what never moves: rasters of the ground, and static boxes with a grid that
@@ -12,18 +11,22 @@ from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
+from di_envs.sensors.scene.actor_boxes import DETAIL_M, add_actor
+from di_envs.sensors.scene.actor_parts import PARTS, Parts
 from di_envs.sensors.scene.boxes import Boxes, Material, boxes_of, copy_box, empty_boxes
 from di_envs.sensors.scene.props import scenery_of
-from di_envs.sensors.scene.signal_heads import LAMP_HALF_M, Lamps, signal_boxes
-from di_envs.sensors.scene.surfaces import Raster, build_rasters
+from di_envs.sensors.scene.raster import Raster
+from di_envs.sensors.scene.signal_heads import LAMP_DEPTH_M, LAMP_HALF_M, Lamps, signal_boxes
+from di_envs.sensors.scene.surfaces import build_rasters
 from di_envs.sensors.scene.tags import Tag
-from di_envs.sensors.scene.vehicle_shapes import DETAIL_M, PART_START, PARTS, add_actor
 from di_envs.town.town import Town
+from di_envs.world.state import State
 
+LONGEST_M = 6.0  # from an actor's middle to what sticks out farthest
 ROOM = 4096  # boxes that a sensor can see at once
 _KEPT = 8  # towns whose scenes are kept
 _LAMP_COLOURS = np.array(
@@ -38,14 +41,13 @@ _LAMP, _PLAIN = int(Material.LAMP), int(Material.PLAIN)
 class Scene(NamedTuple):
     """What is static in a town."""
 
-    base_z: NDArray[np.float64]  # (1,) height of the ground plane [m]
+    base_z: Float64  # (1,) height of the ground plane [m]
     ground: Raster  # of the plane
     deck: Raster  # of the tops of boxes of Material.DECK
     boxes: Boxes
-    reach_m: NDArray[np.float64]  # (B,) of a ball round each box
+    reach_m: Float64  # (B,) of a ball round each box
     lamps: Lamps
-    parts: NDArray[np.float64]  # what actors are made of, see vehicle_shapes
-    part_start: NDArray[np.int64]
+    parts: Parts  # what actors are made of
 
 
 _scenes: OrderedDict[str, Scene] = OrderedDict()
@@ -79,9 +81,8 @@ def build_scene(town: Town) -> Scene:
         reach_m=np.linalg.norm(boxes.half.astype(np.float64), axis=1),
         lamps=lamps,
         parts=PARTS,
-        part_start=PART_START,
     )
-    for bundle in (scene, ground, deck, boxes, lamps):
+    for bundle in (scene, ground, deck, boxes, lamps, PARTS):
         for array in bundle:
             if isinstance(array, np.ndarray):
                 array.flags.writeable = False
@@ -94,17 +95,17 @@ def box_buffer() -> Boxes:
 
 
 @kernel
-def collect_boxes(scene, state, ego, range_m, out):
+def collect_boxes(scene: Scene, state: State, ego: int, range_m: float, out: Boxes) -> None:
     """Puts together all boxes within range of an ego, but for the ego's own.
 
     Actors come first, then lamps, then what is static; within each, by index.
 
     Args:
-        scene: `Scene` of the town.
-        state: `State` of the world.
+        scene: Of the town.
+        state: Of the world.
         ego: Index of the ego that looks.
         range_m: How far it sees [m].
-        out: `Boxes` to overwrite.
+        out: Boxes to overwrite.
     """
     out.count[0] = 0
     x, y = state.x[ego], state.y[ego]
@@ -113,9 +114,9 @@ def collect_boxes(scene, state, ego, range_m, out):
             continue
         dx, dy = state.x[actor] - x, state.y[actor] - y
         far2 = dx * dx + dy * dy
-        if far2 < (range_m + 6.0) * (range_m + 6.0):
+        if far2 < (range_m + LONGEST_M) * (range_m + LONGEST_M):
             detailed = far2 < DETAIL_M * DETAIL_M
-            add_actor(state, actor, detailed, 0.0, scene.parts, scene.part_start, out)
+            add_actor(state, actor, detailed, scene.parts, out)
     _add_lamps(scene.lamps, state, x, y, range_m, out)
     boxes = scene.boxes
     for row in range(boxes.count[0]):
@@ -126,8 +127,8 @@ def collect_boxes(scene, state, ego, range_m, out):
 
 
 @kernel
-def _add_lamps(lamps, state, x, y, range_m, out):
-    """Appends the lamps of traffic lights, lit or dark."""
+def _add_lamps(lamps: Lamps, state: State, x: float, y: float, range_m: float, out: Boxes) -> None:
+    """Appends the lamps of traffic lights within range of a place [m], lit or dark."""
     for lamp in range(lamps.signal.shape[0]):
         dx, dy = lamps.pose[lamp, 0] - x, lamps.pose[lamp, 1] - y
         at = out.count[0]
@@ -138,7 +139,7 @@ def _add_lamps(lamps, state, x, y, range_m, out):
             out.centre[at, axis] = lamps.pose[lamp, axis]
             share = 1.0 if lit else _DARK
             out.colour[at, axis] = share * _LAMP_COLOURS[lamps.state[lamp], axis]
-        out.half[at, 0] = 0.03
+        out.half[at, 0] = LAMP_DEPTH_M
         out.half[at, 1] = LAMP_HALF_M
         out.half[at, 2] = LAMP_HALF_M
         out.yaw[at] = lamps.pose[lamp, 3]

@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
 from di_envs.sensors.scene.boxes import BoxSpec
-from di_envs.sensors.scene.surfaces import ASPHALT, SHOULDER, TEXEL_M
+from di_envs.sensors.scene.raster import TEXEL_M
+from di_envs.sensors.scene.surfaces import ASPHALT, SHOULDER
 from di_envs.sensors.scene.tags import Tag
 from di_envs.town.lanes import LightState, SignalKind, Turn
 from di_envs.town.town import Town
 
 NEAR_HEAD_M, FAR_HEAD_M = 3.4, 5.6  # height of a head's middle
 LAMP_HALF_M = 0.17
+LAMP_DEPTH_M = 0.03  # half of it
 LAMP_SPACING_M = 0.42
 _HOUSING = (0.035, 0.04, 0.035)
 _STEEL = (0.3, 0.31, 0.33)

@@ -38,7 +38,7 @@ class Pose(NamedTuple):
         return Pose(self.x, self.y, wrapped(self.heading + math.pi))
 
 
-class Piece(NamedTuple):
+class CurvePiece(NamedTuple):
     """A line (curvature 0) or an arc (curvature positive to the left)."""
 
     start: Pose
@@ -60,7 +60,7 @@ class Piece(NamedTuple):
         return self.at(self.length_m)
 
 
-Curve = tuple[Piece, ...]
+Curve = tuple[CurvePiece, ...]
 
 
 def wrapped(angle_rad: float) -> float:
@@ -95,7 +95,7 @@ def rounded_polyline(points: Sequence[tuple[float, float, float]]) -> Curve:
     Raises:
         ValueError: If two roundings overlap, naming the corner.
     """
-    pieces: list[Piece] = []
+    pieces: list[CurvePiece] = []
     x, y, _ = points[0]
     for index in range(1, len(points)):
         corner_x, corner_y, radius = points[index]
@@ -111,10 +111,10 @@ def rounded_polyline(points: Sequence[tuple[float, float, float]]) -> Curve:
                 f"the rounding of corner {index} at ({corner_x:g}, {corner_y:g}) needs {cut:.1f} m "
                 f"of a leg of {leg:.1f} m; choose a smaller radius or move the corner"
             )
-        pieces.append(Piece(Pose(x, y, heading), leg - cut, 0.0))
+        pieces.append(CurvePiece(Pose(x, y, heading), leg - cut, 0.0))
         if turn != 0.0:
             pieces.append(
-                Piece(pieces[-1].end, radius * abs(turn), math.copysign(1.0 / radius, turn))
+                CurvePiece(pieces[-1].end, radius * abs(turn), math.copysign(1.0 / radius, turn))
             )
         x, y, _ = pieces[-1].end
     return tuple(piece for piece in pieces if piece.length_m > 1e-6)
@@ -142,9 +142,9 @@ def curve_between(start: Pose, end: Pose) -> Curve:
             f"tangents meet {before:.2f} m after the start and {after:.2f} m before the end"
         )
     radius = shorter / math.tan(abs(turn) / 2.0)
-    line_in = Piece(start, before - shorter, 0.0)
-    arc = Piece(line_in.end, radius * abs(turn), math.copysign(1.0 / radius, turn))
-    line_out = Piece(arc.end, after - shorter, 0.0)
+    line_in = CurvePiece(start, before - shorter, 0.0)
+    arc = CurvePiece(line_in.end, radius * abs(turn), math.copysign(1.0 / radius, turn))
+    line_out = CurvePiece(arc.end, after - shorter, 0.0)
     return tuple(piece for piece in (line_in, arc, line_out) if piece.length_m > 1e-6)
 
 
@@ -166,11 +166,11 @@ def _biarc(start: Pose, end: Pose) -> Curve:
     return first, _arc_to(first.end, end.x, end.y)
 
 
-def _arc_to(start: Pose, x: float, y: float) -> Piece:
+def _arc_to(start: Pose, x: float, y: float) -> CurvePiece:
     """The arc that leaves `start` with its heading and passes through a point."""
     chord = math.hypot(x - start.x, y - start.y)
     half_turn = wrapped(math.atan2(y - start.y, x - start.x) - start.heading)
     curvature = 2.0 * math.sin(half_turn) / chord
     if abs(curvature) < _STRAIGHT_PER_M:
-        return Piece(start, chord, 0.0)
-    return Piece(start, 2.0 * half_turn / curvature, curvature)
+        return CurvePiece(start, chord, 0.0)
+    return CurvePiece(start, 2.0 * half_turn / curvature, curvature)

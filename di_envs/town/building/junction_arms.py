@@ -17,8 +17,8 @@ _STRAIGHT_RAD = math.radians(45.0)
 
 
 @dataclass(frozen=True)
-class Arm:
-    """One end of a street, at a junction."""
+class StreetEnd:
+    """An arm of a junction: the end of a street there."""
 
     street: Street
     contact: str  # which end of the street: "start" or "end"
@@ -42,7 +42,7 @@ class Arm:
         """The mouth's pose `right_m` beside the middle, for those who leave."""
         return self.mouth.reversed().shifted(0.0, -right_m)
 
-    def turn_to(self, other: Arm) -> float:
+    def turn_to(self, other: StreetEnd) -> float:
         """Change of heading from this arm into the other one [rad], left positive."""
         return wrapped(other.mouth.heading + math.pi - self.mouth.heading)
 
@@ -51,27 +51,27 @@ class Arm:
 class Movement:
     """Lanes that lead from one arm into another: `lanes` of them beside each other."""
 
-    source: Arm
-    target: Arm
+    source: StreetEnd
+    target: StreetEnd
     turn: Turn
     source_lane: int  # the innermost of them
     target_lane: int
     lanes: int
 
 
-def arms_of(junction: Junction, plan: StreetPlan) -> list[Arm]:
+def arms_of(junction: Junction, plan: StreetPlan) -> list[StreetEnd]:
     """The arms of a junction, in the order of the plan's streets."""
     arms = []
     for street in plan.streets:
         curve = street.curve()
         if street.start == junction.id:
-            arms.append(Arm(street, "start", curve[0].start.reversed()))
+            arms.append(StreetEnd(street, "start", curve[0].start.reversed()))
         if street.end == junction.id:
-            arms.append(Arm(street, "end", curve[-1].end))
+            arms.append(StreetEnd(street, "end", curve[-1].end))
     return arms
 
 
-def movements(junction: Junction, arms: list[Arm]) -> Iterator[Movement]:
+def movements(junction: Junction, arms: list[StreetEnd]) -> Iterator[Movement]:
     """Every permitted way across: lane i goes straight on into lane i, the innermost lane also
     turns left into the innermost, and the outermost lane turns right into the outermost."""
     for source in arms:
@@ -88,7 +88,7 @@ def movements(junction: Junction, arms: list[Arm]) -> Iterator[Movement]:
                 yield Movement(source, target, Turn.LEFT, 1, 1, 1)
 
 
-def corner_pairs(arms: list[Arm]) -> list[tuple[Arm, Arm]]:
+def corner_pairs(arms: list[StreetEnd]) -> list[tuple[StreetEnd, StreetEnd]]:
     """Neighbouring arms, each with the one to its right, where both have a sidewalk."""
     pairs = []
     for arm in arms:

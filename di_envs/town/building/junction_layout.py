@@ -10,12 +10,18 @@ from dataclasses import replace
 from itertools import count, pairwise
 
 from di_envs.town.building.alignment import curve_between
-from di_envs.town.building.junction_arms import Arm, Movement, arms_of, corner_pairs, movements
+from di_envs.town.building.junction_arms import (
+    Movement,
+    StreetEnd,
+    arms_of,
+    corner_pairs,
+    movements,
+)
 from di_envs.town.building.opendrive_writer import (
-    JunctionRecord,
-    ReferenceRecord,
+    JunctionDraft,
+    ReferenceDraft,
+    RoadDraft,
     RoadEnd,
-    RoadRecord,
     opendrive_text,
 )
 from di_envs.town.building.roadside import controllers_of, heads_of, with_crosswalk
@@ -36,8 +42,8 @@ def town_text(plan: StreetPlan) -> str:
     streets = {street.id: _street_record(street, heights[street.id]) for street in plan.streets}
     road_ids, crosswalk_ids = count(_FIRST_CONNECTOR), count(_FIRST_CROSSWALK)
     signal_ids, controller_ids = count(_FIRST_SIGNAL), count(_FIRST_CONTROLLER)
-    inner: list[RoadRecord] = []
-    junctions: list[JunctionRecord] = []
+    inner: list[RoadDraft] = []
+    junctions: list[JunctionDraft] = []
     for junction in plan.junctions:
         arms = arms_of(junction, plan)
         heads = heads_of(junction, arms, signal_ids)
@@ -54,7 +60,7 @@ def town_text(plan: StreetPlan) -> str:
             roads = with_crosswalk(roads, corners, arm, crosswalk_ids)
         inner += roads + corners
         junctions.append(
-            JunctionRecord(
+            JunctionDraft(
                 id=junction.id,
                 name=f"Junction {junction.id}",
                 connections=tuple(_connection(road) for road in roads + corners),
@@ -65,9 +71,9 @@ def town_text(plan: StreetPlan) -> str:
     return opendrive_text(plan.name, origin, [*streets.values(), *inner], junctions)
 
 
-def _street_record(street: Street, elevation: Elevation) -> RoadRecord:
+def _street_record(street: Street, elevation: Elevation) -> RoadDraft:
     strips = street.section.strips()
-    return RoadRecord(
+    return RoadDraft(
         id=street.id,
         name=f"Street {street.id}",
         junction=-1,
@@ -106,17 +112,17 @@ def _elevation(street: Street) -> Elevation:
     return tuple(rows)
 
 
-def _connector(junction: Junction, way: Movement, road_id: int, head: int | None) -> RoadRecord:
+def _connector(junction: Junction, way: Movement, road_id: int, head: int | None) -> RoadDraft:
     source, target = way.source, way.target
     start = source.inbound_edge(source.street.section.inner_edge_m(way.source_lane))
     end = target.outbound_edge(target.street.section.inner_edge_m(way.target_lane))
     lanes = range(way.lanes)
     strips = (Strip("driving", LANE_WIDTH_M, "none"),) * way.lanes
     slower_kmh = min(source.street.section.speed_kmh, target.street.section.speed_kmh)
-    references: tuple[ReferenceRecord, ...] = ()
+    references: tuple[ReferenceDraft, ...] = ()
     if head is not None:
-        references = (ReferenceRecord(signal=head, station_m=0.5, first=-1, last=-way.lanes),)
-    return RoadRecord(
+        references = (ReferenceDraft(signal=head, station_m=0.5, first=-1, last=-way.lanes),)
+    return RoadDraft(
         id=road_id,
         name=f"{way.turn.name.capitalize()} {source.street.id} to {target.street.id}",
         junction=junction.id,
@@ -142,7 +148,7 @@ def _connector(junction: Junction, way: Movement, road_id: int, head: int | None
     )
 
 
-def _corner(junction: Junction, source: Arm, target: Arm, road_id: int) -> RoadRecord:
+def _corner(junction: Junction, source: StreetEnd, target: StreetEnd, road_id: int) -> RoadDraft:
     """Shoulder, kerb and sidewalk round the corner from an arm to the one on its right."""
     verge = source.street.section.verge()
     curve = curve_between(
@@ -155,7 +161,7 @@ def _corner(junction: Junction, source: Arm, target: Arm, road_id: int) -> RoadR
         first = len(arm.street.section.strips()) - len(verge) + 1
         lanes = {-1 - i: sign * (first + i) for i in range(len(verge))}
         ends.append(RoadEnd(kind="road", id=arm.street.id, contact=arm.contact, lanes=lanes))
-    return RoadRecord(
+    return RoadDraft(
         id=road_id,
         name=f"Corner {source.street.id} to {target.street.id}",
         junction=junction.id,
@@ -170,6 +176,6 @@ def _corner(junction: Junction, source: Arm, target: Arm, road_id: int) -> RoadR
     )
 
 
-def _connection(road: RoadRecord) -> tuple[int, int, tuple[tuple[int, int], ...]]:
+def _connection(road: RoadDraft) -> tuple[int, int, tuple[tuple[int, int], ...]]:
     pairs = tuple((theirs, own) for own, theirs in road.predecessor.lanes.items())
     return road.predecessor.id, road.id, pairs

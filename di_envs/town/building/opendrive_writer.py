@@ -25,7 +25,7 @@ class RoadEnd:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalRecord:
+class SignalDraft:
     """A traffic light (1000001) or stop sign (206) beside a road, for traffic along its `sign`."""
 
     id: int
@@ -37,7 +37,7 @@ class SignalRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReferenceRecord:
+class ReferenceDraft:
     """Says that a signal elsewhere rules this road's lanes `first` to `last`."""
 
     signal: int
@@ -47,7 +47,7 @@ class ReferenceRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrosswalkRecord:
+class CrosswalkDraft:
     """A zebra crossing; `outline` in its own frame: u along its heading, v to the left [m]."""
 
     id: int
@@ -57,8 +57,8 @@ class CrosswalkRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RoadRecord:
-    """A road with one lane section."""
+class RoadDraft:
+    """A road to be written, with one lane section."""
 
     id: int
     name: str
@@ -71,13 +71,13 @@ class RoadRecord:
     right: tuple[Strip, ...]
     predecessor: RoadEnd
     successor: RoadEnd
-    signals: tuple[SignalRecord, ...] = ()
-    references: tuple[ReferenceRecord, ...] = ()
-    crosswalks: tuple[CrosswalkRecord, ...] = ()
+    signals: tuple[SignalDraft, ...] = ()
+    references: tuple[ReferenceDraft, ...] = ()
+    crosswalks: tuple[CrosswalkDraft, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class JunctionRecord:
+class JunctionDraft:
     """A junction: connections are (incoming road, connecting road, lane pairs)."""
 
     id: int
@@ -89,8 +89,8 @@ class JunctionRecord:
 def opendrive_text(
     name: str,
     origin: tuple[float, float],
-    roads: Sequence[RoadRecord],
-    junctions: Sequence[JunctionRecord],
+    roads: Sequence[RoadDraft],
+    junctions: Sequence[JunctionDraft],
 ) -> str:
     """The text of an OpenDRIVE file.
 
@@ -129,7 +129,7 @@ def _text(value: float | str, digits: int = 6) -> str:
 
 
 def _header(
-    top: ET.Element, name: str, origin: tuple[float, float], roads: Sequence[RoadRecord]
+    top: ET.Element, name: str, origin: tuple[float, float], roads: Sequence[RoadDraft]
 ) -> None:
     poses = [pose for road in roads for piece in road.curve for pose in (piece.start, piece.end)]
     header = _add(top, "header", revMajor=1, revMinor=4, name=name, version="1.00")
@@ -145,7 +145,7 @@ def _header(
     )
 
 
-def _road(top: ET.Element, road: RoadRecord) -> None:
+def _road(top: ET.Element, road: RoadDraft) -> None:
     element = _add(
         top,
         "road",
@@ -186,7 +186,7 @@ def _plan_view(element: ET.Element, curve: Curve) -> None:
         station += piece.length_m
 
 
-def _lanes(element: ET.Element, road: RoadRecord) -> None:
+def _lanes(element: ET.Element, road: RoadDraft) -> None:
     lanes = _add(element, "lanes")
     _add(lanes, "laneOffset", s=0, a=0, b=0, c=0, d=0)
     section = _add(lanes, "laneSection", s=0)
@@ -202,7 +202,7 @@ def _lanes(element: ET.Element, road: RoadRecord) -> None:
             _lane(right, -number, strip, road)
 
 
-def _lane(side: ET.Element, lane_id: int, strip: Strip, road: RoadRecord) -> None:
+def _lane(side: ET.Element, lane_id: int, strip: Strip, road: RoadDraft) -> None:
     lane = _add(side, "lane", id=lane_id, type=strip.kind, level="false")
     link = _add(lane, "link")
     for tag, end in (("predecessor", road.predecessor), ("successor", road.successor)):
@@ -223,7 +223,7 @@ def _road_mark(lane: ET.Element, line: str) -> None:
     mark.set("laneChange", "both" if kind == "broken" else "none")
 
 
-def _objects(element: ET.Element, road: RoadRecord) -> None:
+def _objects(element: ET.Element, road: RoadDraft) -> None:
     if not road.crosswalks:
         return
     objects = _add(element, "objects")
@@ -243,7 +243,7 @@ def _objects(element: ET.Element, road: RoadRecord) -> None:
             _add(outline, "cornerLocal", u=u, v=v, z=0)
 
 
-def _signals(element: ET.Element, road: RoadRecord) -> None:
+def _signals(element: ET.Element, road: RoadDraft) -> None:
     if not road.signals and not road.references:
         return
     signals = _add(element, "signals")
@@ -275,7 +275,7 @@ def _signals(element: ET.Element, road: RoadRecord) -> None:
         _add(row, "validity", fromLane=reference.first, toLane=reference.last)
 
 
-def _junction(top: ET.Element, junction: JunctionRecord) -> None:
+def _junction(top: ET.Element, junction: JunctionDraft) -> None:
     element = _add(top, "junction", id=junction.id, name=junction.name)
     for number, (incoming, connecting, pairs) in enumerate(junction.connections):
         row = _add(element, "connection", id=number, incomingRoad=incoming)

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from di_envs.town.building.alignment import Curve, Pose, length_of, pose_at, wrapped
-from di_envs.town.building.junction_arms import Arm
+from di_envs.town.building.junction_arms import StreetEnd
 from di_envs.town.building.opendrive_writer import (
-    CrosswalkRecord,
+    CrosswalkDraft,
+    RoadDraft,
     RoadEnd,
-    RoadRecord,
-    SignalRecord,
+    SignalDraft,
 )
 from di_envs.town.building.street_plan import Control, Junction
 
@@ -26,8 +26,8 @@ _LIGHT, _STOP = "1000001", "206"
 
 
 def heads_of(
-    junction: Junction, arms: list[Arm], signal_ids: Iterator[int]
-) -> list[tuple[Arm, SignalRecord]]:
+    junction: Junction, arms: list[StreetEnd], signal_ids: Iterator[int]
+) -> list[tuple[StreetEnd, SignalDraft]]:
     """A light or stop sign at the right of every arm that has to heed one."""
     stem = max(arms, key=lambda arm: min(abs(arm.turn_to(o)) for o in arms if o is not arm))
     kind = _LIGHT if junction.control is Control.LIGHTS else _STOP
@@ -38,7 +38,7 @@ def heads_of(
         section = arm.street.section
         station = length_of(arm.street.curve()) - _SIGNAL_BEFORE_MOUTH_M
         right = section.paved_m + section.shoulder_m + section.kerb_m / 2.0
-        head = SignalRecord(
+        head = SignalDraft(
             id=next(signal_ids),
             name=f"{'Light' if kind == _LIGHT else 'Stop'} {junction.id} of {arm.street.id}",
             type=kind,
@@ -51,7 +51,7 @@ def heads_of(
 
 
 def controllers_of(
-    junction: Junction, heads: list[tuple[Arm, SignalRecord]], ids: Iterator[int]
+    junction: Junction, heads: list[tuple[StreetEnd, SignalDraft]], ids: Iterator[int]
 ) -> tuple[tuple[int, tuple[int, ...]], ...]:
     """The light groups in the order of their turns: one an arm, but for those named together."""
     if junction.control is not Control.LIGHTS:
@@ -65,8 +65,8 @@ def controllers_of(
 
 
 def with_crosswalk(
-    roads: list[RoadRecord], corners: list[RoadRecord], arm: Arm, ids: Iterator[int]
-) -> list[RoadRecord]:
+    roads: list[RoadDraft], corners: list[RoadDraft], arm: StreetEnd, ids: Iterator[int]
+) -> list[RoadDraft]:
     """Adds the crosswalk over an arm's mouth, where both of its corners have a sidewalk."""
     right = next((road for road in corners if _leaves(road.predecessor, arm)), None)
     left = next((road for road in corners if _leaves(road.successor, arm)), None)
@@ -80,7 +80,7 @@ def with_crosswalk(
     to_left = _sidewalk_left_of(left, arm.mouth) - offset
     to_right = _sidewalk_left_of(right, arm.mouth) - offset
     half = _CROSSWALK_WIDTH_M / 2.0
-    walk = CrosswalkRecord(
+    walk = CrosswalkDraft(
         id=next(ids),
         station_m=station,
         heading_rad=wrapped(arm.mouth.heading + math.pi / 2.0 - pose.heading),
@@ -90,11 +90,11 @@ def with_crosswalk(
     return [*roads[:index], changed, *roads[index + 1 :]]
 
 
-def _leaves(end: RoadEnd, arm: Arm) -> bool:
+def _leaves(end: RoadEnd, arm: StreetEnd) -> bool:
     return end.id == arm.street.id and end.contact == arm.contact
 
 
-def _starts_in_middle(road: RoadRecord, arm: Arm) -> bool:
+def _starts_in_middle(road: RoadDraft, arm: StreetEnd) -> bool:
     innermost = arm.lane_id(1, inbound=True)
     return _leaves(road.predecessor, arm) and road.predecessor.lanes[-1] == innermost
 
@@ -109,7 +109,7 @@ def _station_ahead(curve: Curve, mouth: Pose, ahead_m: float) -> float:
     return low
 
 
-def _sidewalk_left_of(corner: RoadRecord, mouth: Pose) -> float:
+def _sidewalk_left_of(corner: RoadDraft, mouth: Pose) -> float:
     """How far left of a mouth's middle a corner's sidewalk passes the crosswalk [m]."""
     inside = sum(strip.width_m for strip in corner.right) - corner.right[-1].width_m / 2.0
     steps = range(101)

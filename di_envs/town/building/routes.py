@@ -65,7 +65,6 @@ SHORT_CROSSINGS = (
     Kind(count=2, lit=True, turns=(Turn.RIGHT,), change=False, ahead_m=28, behind_m=65),
     Kind(count=2, lit=True, turns=(Turn.STRAIGHT,), change=False, ahead_m=30, behind_m=62),
 )
-SHORT_STREETS = 4  # without a junction: two on the ring, one on the single-lane road, one in a bend
 
 
 def build_long(graph: RoadGraph, town: str) -> list[RouteSpec]:

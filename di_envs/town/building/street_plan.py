@@ -6,15 +6,13 @@ A table is JSON, in the world frame (x east, y *south*); reading it turns it to 
 
 from __future__ import annotations
 
-import dataclasses
-import difflib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from di_envs.files.json_values import from_json, read_json
 from di_envs.town.building.alignment import Curve, rounded_polyline
 
 LANE_WIDTH_M = 3.5
@@ -131,57 +129,78 @@ class StreetPlan:
             raise ValueError(f"plan '{self.name}' gives an id to two streets or two junctions")
 
 
+# A table's objects, as it spells them
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Street:
+    id: int
+    section: str
+    start: int
+    end: int
+    points: tuple[tuple[float, ...], ...]  # x, y (world frame), corner radius if there is one
+    profile: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+
+    def __post_init__(self) -> None:
+        for point in self.points:
+            if len(point) not in (2, 3):
+                raise ValueError(f"points are [x, y] or [x, y, radius], not {list(point)}")
+
+    def street(self, sections: Mapping[str, CrossSection]) -> Street:
+        """The street, with its section."""
+        if self.section not in sections:
+            raise ValueError(
+                f"street {self.id} has section '{self.section}'; known: {sorted(sections)}"
+            )
+        # from the world frame to OpenDRIVE's: here, and nowhere else
+        points = tuple((x, -y, radius[0] if radius else 0.0) for x, y, *radius in self.points)
+        return Street(
+            id=self.id,
+            section=sections[self.section],
+            start=self.start,
+            end=self.end,
+            points=points,
+            profile=self.profile,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Table:
+    name: str
+    about: str = ""
+    latitude: float
+    longitude: float
+    sections: Mapping[str, CrossSection]
+    junctions: tuple[Junction, ...]
+    streets: tuple[_Street, ...]
+
+
 def read_plan(path: Path) -> StreetPlan:
     """Reads a table of streets.
 
     Raises:
-        ValueError: If a key is unknown or a street names a section or junction that is not there.
+        ValueError: As `plan_of`, or if the file is no JSON.
     """
-    return plan_of(json.loads(path.read_text(encoding="utf-8")))
+    return plan_of(read_json(path), str(path))
 
 
-def plan_of(table: Mapping[str, Any]) -> StreetPlan:
+def plan_of(values: Any, source: str = "street table") -> StreetPlan:
     """The plan that a table of streets describes, as JSON has it.
 
+    Args:
+        values: JSON values.
+        source: What errors call the file.
+
     Raises:
-        ValueError: If a key is unknown or a street names a section or junction that is not there.
+        ValueError: If a key is unknown or missing, a value of another type, or if a street names a
+            section or junction that is not there.
     """
-    sections = {name: _build(CrossSection, row) for name, row in table["sections"].items()}
-    values = {
-        **{key: value for key, value in table.items() if key != "sections"},
-        "junctions": tuple(_junction(row) for row in table["junctions"]),
-        "streets": tuple(_street(row, sections) for row in table["streets"]),
-    }
-    plan: StreetPlan = _build(StreetPlan, values)
-    return plan
-
-
-def _junction(row: Mapping[str, Any]) -> Junction:
-    values = {**row, "control": Control(row["control"])}
-    values["one_phase"] = tuple(tuple(group) for group in row.get("one_phase", ()))
-    junction: Junction = _build(Junction, values)
-    return junction
-
-
-def _street(row: Mapping[str, Any], sections: Mapping[str, CrossSection]) -> Street:
-    if row["section"] not in sections:
-        raise ValueError(
-            f"street {row['id']} has section '{row['section']}'; known: {sorted(sections)}"
-        )
-    # from the world frame to OpenDRIVE's: here, and nowhere else
-    points = tuple((x, -y, radius[0] if radius else 0.0) for x, y, *radius in row["points"])
-    values = {**row, "section": sections[row["section"]], "points": points}
-    if "profile" in row:
-        values["profile"] = tuple((station, height) for station, height in row["profile"])
-    street: Street = _build(Street, values)
-    return street
-
-
-def _build(kind: Any, values: Mapping[str, Any]) -> Any:
-    known = [field.name for field in dataclasses.fields(kind)]
-    for key in values:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}."
-            raise ValueError(f"{kind.__name__} has no field '{key}'; {hint}")
-    return kind(**values)
+    table = from_json(_Table, values, source)
+    return StreetPlan(
+        name=table.name,
+        about=table.about,
+        latitude=table.latitude,
+        longitude=table.longitude,
+        junctions=table.junctions,
+        streets=tuple(street.street(table.sections) for street in table.streets),
+    )

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Where the lanes of a junction come so close that two vehicles cannot pass at once."""
 
 from __future__ import annotations
@@ -7,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import LaneKind, Lanes
 
@@ -40,8 +40,25 @@ def find_conflicts(lanes: Lanes) -> dict[str, Any]:
 
 
 @kernel
-def _conflict_rows(members, junction, road, first, count, spacing, points):
-    """(C, 6): lane, other lane, its begin and end, the other's begin and end [m]."""
+def _conflict_rows(
+    members: Int32,
+    junction: Int32,
+    road: Int32,
+    first: Int32,
+    count: Int32,
+    spacing: Float64,
+    points: Float64,
+) -> Float64:
+    """All places where two lanes come close, each from both sides.
+
+    Args:
+        members: (M,) driving lanes in junctions, those of a junction in a row.
+        junction, road, first, count, spacing: (L,) as of `Lanes`.
+        points: (P, 4) as of `Lanes`.
+
+    Returns:
+        (C, 6): lane, other lane, its begin and end, the other's begin and end [m].
+    """
     rows = np.empty((256, 6))
     found = 0
     for a_index in range(len(members)):
@@ -68,8 +85,16 @@ def _conflict_rows(members, junction, road, first, count, spacing, points):
 
 
 @kernel
-def _next_interval(a, b, k, first, count, spacing, points):
+def _next_interval(
+    a: int, b: int, k: int, first: Int32, count: Int32, spacing: Float64, points: Float64
+) -> tuple[int, int, int, int]:
     """The next run of a's points from k on that b comes close to, and b's points that do.
+
+    Args:
+        a, b: Two lanes.
+        k: A point of a, counted along it.
+        first, count, spacing: (L,) as of `Lanes`.
+        points: (P, 4) as of `Lanes`.
 
     Returns:
         First and last point of a, least and greatest point of b; -1 where there is no more.
@@ -90,8 +115,20 @@ def _next_interval(a, b, k, first, count, spacing, points):
 
 
 @kernel
-def _near(point, b_first, b_count, step, points):
-    """Points of lane b within reach of a point: least, greatest (-1 for none), points to skip."""
+def _near(
+    point: int, b_first: int, b_count: int, step: float, points: Float64
+) -> tuple[int, int, int]:
+    """Which points of a lane are within reach of a point of another.
+
+    Args:
+        point: The point, an index into `points`.
+        b_first, b_count: The lane's first point and how many it has.
+        step: Between points of the lane that `point` is on [m].
+        points: (P, 4) x, y, z, yaw.
+
+    Returns:
+        The least and greatest of them (-1 for none), and how many points on may be skipped.
+    """
     x, y, z = points[point, 0], points[point, 1], points[point, 2]
     low, high, nearest = -1, -1, 1e18
     for k in range(b_count):
@@ -109,7 +146,7 @@ def _near(point, b_first, b_count, step, points):
 
 
 @kernel
-def _around(begin, end, count, spacing):
+def _around(begin: int, end: int, count: int, spacing: float) -> tuple[float, float]:
     """Stations half a point around a run of points, within the lane [m]."""
     length = (count - 1) * spacing
     return max(0.0, (begin - 0.5) * spacing), min(length, (end + 0.5) * spacing)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64
 from di_envs.town.lanes import Crosswalks, LaneKind, Lanes
 from di_envs.town.reading.records import CrosswalkRecord, OpenDrive
 from di_envs.town.reading.sampling import LaneGeometry
-
-Float64 = NDArray[np.float64]
 
 LEVEL_M = 2.5  # lanes further above or below are not crossed
 

@@ -7,13 +7,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Int32
 from di_envs.town.lanes import LaneKind
 from di_envs.town.reading.records import Connection, OpenDrive, RoadLink, RoadRecord
 from di_envs.town.reading.stretches import Record, Stretch
-
-Int32 = NDArray[np.int32]
 
 
 class Joint(NamedTuple):

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.town.lanes import LaneKind, Lanes, Turn
 from di_envs.town.reading.conflicts import find_conflicts
 from di_envs.town.reading.links import as_ranges, find_successors, reversed_links
 from di_envs.town.reading.records import OpenDrive
 from di_envs.town.reading.sampling import LaneGeometry, Samples, sample_lanes
 from di_envs.town.reading.stretches import Stretch, find_stretches
-
-Int8 = NDArray[np.int8]
-Int32 = NDArray[np.int32]
-Float64 = NDArray[np.float64]
 
 DEFAULT_SPEED_MPS = 50.0 / 3.6  # where neither a lane, its road nor a neighbour along it says
 STRAIGHT_BELOW_RAD = np.deg2rad(35.0)  # CARLA's planner calls smaller changes of heading straight

@@ -236,7 +236,6 @@ def _signals(road: Element) -> tuple[SignalRecord, ...]:
             s=_number(e, "s", 0.0),
             t=_number(e, "t", 0.0),
             z_offset=_number(e, "zOffset", 0.0),
-            h_offset=_number(e, "hOffset", 0.0),
             orientation=e.get("orientation", "none"),
             validity=tuple(
                 (int(v.get("fromLane", "0")), int(v.get("toLane", "0")))

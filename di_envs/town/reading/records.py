@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from di_envs.numerics.arrays import Float64
 from di_envs.town.lanes import LaneKind
-
-Float64 = NDArray[np.float64]
 
 GEOMETRY_SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 
@@ -70,7 +66,6 @@ class SignalRecord:
     s: float
     t: float
     z_offset: float
-    h_offset: float
     orientation: str  # "+", "-" or "none"
     validity: tuple[tuple[int, int], ...]  # (from lane, to lane)
 

@@ -10,12 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Float64, Int64
 from di_envs.town.reading.records import GEOMETRY_SHAPES, GeometryRecord
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)  # exact to 1e-12 for turns below 20 rad
 _TABLE_STEPS = 1024  # steps of the arc-length table of a polynomial

@@ -9,15 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Bool, Float64, Int64
 from di_envs.town.reading.records import LaneRecord, OpenDrive
 from di_envs.town.reading.reference_line import Breakpoints, Cubics, ReferenceLines
 from di_envs.town.reading.stretches import Record, Stretch
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 SPACING = 0.5  # m, the greatest between two points of a lane
 MINIMUM_LANE_LENGTH = 1e-3  # m; keeps spacings positive where a section has no length

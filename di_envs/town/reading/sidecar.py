@@ -21,16 +21,14 @@ limit in the map is `map_kmh` (within 1 km/h) get `kmh`.
 
 from __future__ import annotations
 
-import difflib
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.json_values import from_json, read_json
 from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.arms import Arm, junction_arms, junction_centres, stem_of
 from di_envs.town.reading.signals import Head, heads_of_arms
@@ -47,11 +45,7 @@ ARM_MATCH_M = 12.0  # between an arm's stop line and the point that a sidecar na
 MANY_ARMS = 4  # junctions of so many arms get lights or all-way stops when guessing
 LANES_FOR_LIGHTS = 1.75  # approach lanes an arm, on average, from which a guess takes lights
 
-_FILE_KEYS = ("town", "source", "speed_limits", "junctions")
-_SPEED_KEYS = ("map_kmh", "kmh")
-_JUNCTION_KEYS = ("junction", "centre", "kind", "arms")
-_ARM_KEYS = ("at", "kind")
-_ARM_WORDS = ("all", "stem")
+Kind = Literal["lights", "stop", "yield", "none"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,25 +74,65 @@ class Sidecar:
     speed_limits: tuple[tuple[float, float], ...]  # limit in the map, limit instead [km/h]
 
 
+# A file's objects, as it spells them
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Arm:
+    at: tuple[float, float]
+    kind: Kind | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Junction:
+    junction: str | int | None = None
+    centre: tuple[float, float] | None = None
+    kind: Kind
+    arms: Literal["all", "stem"] | tuple[_Arm, ...] = "all"
+
+    def __post_init__(self) -> None:
+        if self.junction is None and self.centre is None:
+            raise ValueError("it has neither 'junction' nor 'centre'; one must say which it is")
+
+    def rule(self) -> JunctionRule:
+        """What it says."""
+        arms: str | tuple[ArmRule, ...]
+        if isinstance(self.arms, str):
+            arms = self.arms
+        else:
+            arms = tuple(ArmRule(at=arm.at, kind=arm.kind or self.kind) for arm in self.arms)
+        name = list(self.centre or ()) if self.junction is None else self.junction
+        return JunctionRule(name=str(name), centre=self.centre, kind=self.kind, arms=arms)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Speed:
+    map_kmh: float
+    kmh: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.kmh <= 300.0:
+            raise ValueError(f"kmh must lie in (0, 300], got {self.kmh:g}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _File:
+    town: str = ""
+    source: str = ""
+    speed_limits: tuple[_Speed, ...] = ()
+    junctions: tuple[_Junction, ...]
+
+
 def read_sidecar(path: Path) -> Sidecar:
     """Reads a sidecar file.
 
     Raises:
-        FileNotFoundError: If there is none.
-        ValueError: If it is not JSON, or holds unknown keys, kinds or arms.
+        JsonError: If it is missing, is not JSON, or holds unknown keys, kinds or arms.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise ValueError(f"{path} is not JSON ({error}); expected a signals sidecar.") from error
-    _check_keys(content, _FILE_KEYS, str(path))
-    if not isinstance(content.get("junctions"), list):
-        raise ValueError(f"{path}: 'junctions' must be a list of objects.")
-    rows = enumerate(content["junctions"])
-    speeds = enumerate(content.get("speed_limits", ()))
+    file = from_json(_File, read_json(path), str(path))
     return Sidecar(
-        junctions=tuple(_junction_rule(row, f"{path}: junctions[{i}]") for i, row in rows),
-        speed_limits=tuple(_speed_rule(row, f"{path}: speed_limits[{i}]") for i, row in speeds),
+        junctions=tuple(row.rule() for row in file.junctions),
+        speed_limits=tuple((row.map_kmh, row.kmh) for row in file.speed_limits),
     )
 
 
@@ -156,63 +190,6 @@ def guessed_heads(lanes: Lanes, junctions: tuple[str, ...]) -> list[Head]:
                 kind = SignalKind.LIGHT
         heads += heads_of_arms(arms, [kind if arm in stem else None for arm in arms])
     return heads
-
-
-def _junction_rule(row: Any, where: str) -> JunctionRule:
-    _check_keys(row, _JUNCTION_KEYS, where)
-    if "junction" not in row and "centre" not in row:
-        raise ValueError(f"{where} has neither 'junction' nor 'centre'; one must say which it is.")
-    kind = _checked(row.get("kind"), tuple(KINDS), f"{where}: kind")
-    arms = row.get("arms", "all")
-    if isinstance(arms, list):
-        rules = []
-        for i, arm in enumerate(arms):
-            _check_keys(arm, _ARM_KEYS, f"{where}: arms[{i}]")
-            own = _checked(arm.get("kind", kind), tuple(KINDS), f"{where}: arms[{i}]: kind")
-            rules.append(ArmRule(at=_point(arm.get("at"), f"{where}: arms[{i}]: at"), kind=own))
-        arms = tuple(rules)
-    else:
-        arms = _checked(arms, _ARM_WORDS, f"{where}: arms")
-    return JunctionRule(
-        name=str(row.get("junction", row.get("centre"))),
-        centre=_point(row["centre"], f"{where}: centre") if "centre" in row else None,
-        kind=kind,
-        arms=arms,
-    )
-
-
-def _speed_rule(row: Any, where: str) -> tuple[float, float]:
-    _check_keys(row, _SPEED_KEYS, where)
-    try:
-        in_map, instead = float(row["map_kmh"]), float(row["kmh"])
-    except (KeyError, TypeError, ValueError):
-        raise ValueError(f"{where} needs the numbers map_kmh and kmh, got {row!r}.") from None
-    if not 0.0 < instead <= 300.0:
-        raise ValueError(f"{where}: kmh must lie in (0, 300], got {instead:g}.")
-    return in_map, instead
-
-
-def _check_keys(row: Any, known: tuple[str, ...], where: str) -> None:
-    if not isinstance(row, Mapping):
-        raise ValueError(f"{where} must be an object with the keys {', '.join(known)}.")
-    for key in row:
-        _checked(key, known, f"{where}: key")
-
-
-def _checked(value: Any, known: tuple[str, ...], where: str) -> str:
-    if value in known:
-        return str(value)
-    near = difflib.get_close_matches(str(value), known, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}."
-    raise ValueError(f"{where} '{value}' is unknown; {hint}")
-
-
-def _point(value: Any, where: str) -> tuple[float, float]:
-    try:
-        x, y = value
-        return float(x), float(y)
-    except (TypeError, ValueError):
-        raise ValueError(f"{where} must be [x, y] in metres, not {value!r}.") from None
 
 
 def _match(

@@ -88,9 +88,9 @@ def plan_route(
     options: list[int] = []
     for leg in range(len(places) - 1):
         path = _path_between(graph, snaps, leg, route_id)
-        piece = _trace_path(graph, path, snaps[leg], snaps[leg + 1], places[leg + 1], turns)
-        pieces.append(piece.trace)
-        options.extend(piece.options)
+        laid = _trace_path(graph, path, snaps[leg], snaps[leg + 1], places[leg + 1], turns)
+        pieces.append(laid.trace)
+        options.extend(laid.options)
     trace = name_connectors(town.lanes, join_traces(pieces))
     plan = _plan_of(town, route_id, places, trace, np.array(options, np.int8))
     if plan.length_m < LEAST_M:
@@ -143,8 +143,8 @@ class _TurnMemory:
 
 
 @dataclass(kw_only=True)
-class _Piece:
-    """A dense piece of route while it is laid."""
+class _LaidLeg:
+    """A dense stretch of route, from a keypoint to the next, while it is laid."""
 
     traces: list[Trace] = field(default_factory=list)
     options: list[int] = field(default_factory=list)
@@ -218,26 +218,26 @@ def _trace_path(
     end: Snap,
     goal: NDArray[np.float64],
     turns: _TurnMemory,
-) -> _Piece:
+) -> _LaidLeg:
     """Lays the points of one leg along a path of nodes."""
     edges = [graph.edges[a][b] for a, b in pairwise(path)]
-    piece = _Piece()
+    leg = _LaidLeg()
     here = start.place
     for i, edge in enumerate(edges):
         option = _turn_option(graph, edges, i, turns)
         if edge.option in _LANE_CHANGES:
-            piece.add(here, option)
+            leg.add(here, option)
             here = _beyond_change(graph, edge, here)
-            piece.add(here, option)
+            leg.add(here, option)
             continue
         along = edge.trace.part(slice(_nearest(edge.trace, here), None))
         if i == len(edges) - 1:
             along = _cut_at_goal(edge, along, end, goal)
         else:
             along = _ending_on(along, edge, edges[i + 1])
-        piece.add(along, option)
+        leg.add(along, option)
         here = along.part(slice(-1, None))
-    return piece
+    return leg
 
 
 def _ending_on(along: Trace, edge: Edge, following: Edge) -> Trace:

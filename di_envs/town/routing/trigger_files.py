@@ -13,13 +13,17 @@ find their places without it in the Leaderboard too.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from di_envs.files.json_values import JsonError, from_json, indented, read_json
+from di_envs.files.whole import write_whole
 
 NUMBERS = range(1, 11)  # of the Leaderboard 1.0's scenarios
+_NUMBER_OF = {f"Scenario{number}": number for number in NUMBERS}
 
 
 class TriggerFileError(ValueError):
@@ -34,6 +38,46 @@ class PlacedScenario(NamedTuple):
     y: float
     z: float
     yaw_rad: float
+
+
+# A file's objects, as far as they are read
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Transform:
+    x: float | str  # some files hold numbers as strings
+    y: float | str
+    z: float | str
+    yaw: float | str
+
+    def __post_init__(self) -> None:
+        for key, value in vars(self).items():
+            if not math.isfinite(_number(value)):
+                raise ValueError(f"expected a finite number for '{key}', got {value!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Event:
+    transform: _Transform
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Scenario:
+    scenario_type: str
+    available_event_configurations: tuple[_Event, ...]
+
+    def __post_init__(self) -> None:
+        if self.scenario_type not in _NUMBER_OF:
+            raise ValueError(
+                f"unknown scenario type {self.scenario_type!r}; the Leaderboard 1.0 has Scenario1 "
+                f"to Scenario{NUMBERS[-1]}. Files for Leaderboard 2.x list scenarios in the route "
+                "file"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _File:
+    available_scenarios: tuple[Mapping[str, tuple[_Scenario, ...]], ...]
 
 
 def read_triggers(
@@ -57,9 +101,9 @@ def read_triggers(
     others: dict[str, None] = {}
     names = {town.casefold() for town in towns}
     for path in _files([paths] if isinstance(paths, Path) else paths):
-        for town, scenarios, where in _towns(_content(path), path):
+        for town, scenarios in _towns(path):
             if town.casefold() in names:
-                placed.extend(_scenarios(scenarios, where))
+                placed.extend(_placed(scenarios))
             else:
                 others[town] = None
     if not placed and others:
@@ -85,7 +129,7 @@ def write_triggers(path: Path, town: str, placed: Iterable[PlacedScenario]) -> N
         for number in sorted(by_number)
     ]
     content = {"available_scenarios": [{town: scenarios}]}
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_whole(path, indented(content))
 
 
 def _transform(place: PlacedScenario) -> dict[str, float]:
@@ -107,83 +151,33 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
             raise TriggerFileError(f"{path}: there is no such trigger file or folder.")
 
 
-def _content(path: Path) -> Any:
+def _towns(path: Path) -> Iterator[tuple[str, tuple[_Scenario, ...]]]:
+    """Each town with its scenarios."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        file = from_json(_File, read_json(path), str(path), foreign=True)
+    except JsonError as error:
         raise TriggerFileError(
-            f"{path}: expected CARLA's trigger JSON, but it is not JSON: {error}."
+            f"{error}. Expected is CARLA's trigger JSON, "
+            '{"available_scenarios": [{"Town05": [...]}]}.'
         ) from error
-    except OSError as error:
-        raise TriggerFileError(f"{path}: the trigger file cannot be read: {error}.") from error
+    for towns in file.available_scenarios:
+        yield from towns.items()
 
 
-def _towns(content: Any, path: Path) -> Iterator[tuple[str, list[Any], str]]:
-    """Each town's list of scenarios, and where it stands."""
-    listed = content.get("available_scenarios") if isinstance(content, dict) else None
-    if not isinstance(listed, list) or not all(isinstance(towns, dict) for towns in listed):
-        raise TriggerFileError(
-            f"{path}: expected CARLA's trigger JSON, "
-            '{"available_scenarios": [{"Town05": [...]}]}; '
-            f"got {_shape(content)}."
-        )
-    for towns in listed:
-        for town, scenarios in towns.items():
-            where = f"{path}: town '{town}'"
-            if not isinstance(scenarios, list):
-                raise TriggerFileError(f"{where}: expected a list of scenarios, got {scenarios!r}.")
-            yield town, scenarios, where
-
-
-def _scenarios(scenarios: list[Any], where: str) -> Iterator[PlacedScenario]:
+def _placed(scenarios: Iterable[_Scenario]) -> Iterator[PlacedScenario]:
     for scenario in scenarios:
-        number = _number(scenario, where)
-        events = scenario.get("available_event_configurations")
-        if not isinstance(events, list):
-            raise TriggerFileError(
-                f"{where}: Scenario{number} needs a list 'available_event_configurations', "
-                f"got {_shape(events)}."
-            )
-        for i, event in enumerate(events):
-            yield _placed(number, event, f"{where}: Scenario{number}, event configuration {i}")
+        for event in scenario.available_event_configurations:
+            at = event.transform
+            x, y, z, yaw_deg = (_number(value) for value in (at.x, at.y, at.z, at.yaw))
+            number = _NUMBER_OF[scenario.scenario_type]
+            yield PlacedScenario(number, x, y, z, math.radians(yaw_deg))
 
 
-def _number(scenario: Any, where: str) -> int:
-    name = scenario.get("scenario_type") if isinstance(scenario, dict) else None
-    known = {f"Scenario{number}": number for number in NUMBERS}
-    if name not in known:
-        raise TriggerFileError(
-            f"{where}: unknown scenario type {name!r}; the Leaderboard 1.0 has Scenario1 to "
-            f"Scenario{NUMBERS[-1]}. Files for Leaderboard 2.x list scenarios in the route file."
-        )
-    return known[name]
-
-
-def _placed(number: int, event: Any, where: str) -> PlacedScenario:
-    transform = event.get("transform") if isinstance(event, dict) else None
-    if not isinstance(transform, dict):
-        raise TriggerFileError(f"{where}: expected a 'transform' with x, y, z, yaw, got {event!r}.")
-    x, y, z, yaw_deg = (_value(transform, key, where) for key in ("x", "y", "z", "yaw"))
-    return PlacedScenario(number, x, y, z, math.radians(yaw_deg))
-
-
-def _value(transform: dict[str, Any], key: str, where: str) -> float:
+def _number(value: float | str) -> float:
     try:
-        value = float(transform[key])  # some files hold numbers as strings
-    except (KeyError, TypeError, ValueError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise TriggerFileError(
-            f"{where}: expected a finite number for '{key}', got {transform.get(key)!r}."
-        )
-    return value
-
-
-def _shape(content: Any) -> str:
-    """What was found instead, in a few words."""
-    if isinstance(content, dict):
-        return f"an object with {', '.join(map(repr, list(content)[:5])) or 'nothing in it'}"
-    return "nothing" if content is None else f"a {type(content).__name__}"
+        return float(value)
+    except ValueError:
+        return math.nan
 
 
 def _text(paths: Path | Sequence[Path]) -> str:

@@ -1,13 +1,13 @@
-# mypy: disallow_untyped_defs=False
 """Which contacts of an ego count as collisions: the de-duplication of Leaderboard 1.0."""
 
 from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.events.rows import record
-from di_envs.world.state import COLLISION_MEMORY, TICK_S, ActorKind, EventKind
+from di_envs.world.state import COLLISION_MEMORY, TICK_S, ActorKind, EventKind, State
 
 MEMORY_TICKS = round(5.0 / TICK_S)  # for which the last actor hit is remembered
 SAME_PLACE_M = 3.0  # from a remembered place, within which nothing counts
@@ -20,7 +20,7 @@ HIT_STATIC = int(EventKind.COLLISION_STATIC)
 
 
 @kernel
-def forget_collisions(state, ego):
+def forget_collisions(state: State, ego: int) -> None:
     """Drops the last actor after 5 s and each place once the ego is more than 5 m from it."""
     if state.tick[()] - state.last_collision_tick[ego] > MEMORY_TICKS:
         state.last_collision_actor[ego] = -1
@@ -35,7 +35,8 @@ def forget_collisions(state, ego):
 
 
 @kernel
-def _remember(state, ego, other):
+def _remember(state: State, ego: int, other: int) -> None:
+    """Notes whom an ego has hit, when, and where it was."""
     state.last_collision_actor[ego] = other
     state.last_collision_tick[ego] = state.tick[()]
     places = state.collision_places[ego]
@@ -50,7 +51,7 @@ def _remember(state, ego, other):
 
 
 @kernel
-def count_collision(state, ego, other, out, n):
+def count_collision(state: State, ego: int, other: int, out: Float64, n: int) -> int:
     """Records a contact, unless it is with the last actor hit or near the place of another.
 
     The ego's own speed plays no part: being hit while standing counts in 1.0. As the place is the
@@ -72,4 +73,4 @@ def count_collision(state, ego, other, out, n):
         kind = HIT_WALKER
     elif state.kind[other] >= PROP:
         kind = HIT_STATIC
-    return record(out, n, kind, ego, state.tick[()], x, y, z, other, 0.0)
+    return record(out, n, kind, ego, int(state.tick[()]), x, y, z, other, 0.0)

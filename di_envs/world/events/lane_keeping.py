@@ -1,16 +1,16 @@
-# mypy: disallow_untyped_defs=False
 """Driving outside lanes or against them, by Leaderboard 1.0: metres now, one event at the end."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import LaneKind
+from di_envs.town.lanes import LaneKind, Lanes
 from di_envs.town.queries import nearest_lane, pose_at, width_at
+from di_envs.world.bodies import EgoNow
 from di_envs.world.events.progress import is_past
+from di_envs.world.state import Routes, State
 
 ALLOWED_OUT_M = 1.3  # beyond the lane's edge, for the ego's centre
 AGAINST_LANE = math.cos(math.radians(120.0))  # leaving a junction this far off the lane's direction
@@ -21,7 +21,7 @@ PARKING_MASK = 1 << int(LaneKind.PARKING)
 
 
 @kernel
-def is_outside_lanes(lanes, now):
+def is_outside_lanes(lanes: Lanes, now: EgoNow) -> bool:
     """Whether the ego's centre is over 1.3 m beyond the nearest driving or parking lane."""
     width, distance = 0.0, math.inf
     if now.lane >= 0:
@@ -31,7 +31,7 @@ def is_outside_lanes(lanes, now):
     if distance <= 0.5 * width:  # on its lane: no parking lane could make that an infraction
         return False
     parking, at, _lateral, away = nearest_lane(
-        lanes, now.x, now.y, now.z, PARKING_LOOK_M, np.int64(PARKING_MASK)
+        lanes, now.x, now.y, now.z, PARKING_LOOK_M, as_int64(PARKING_MASK)
     )
     if parking >= 0 and away <= distance:
         distance, width = away, width_at(lanes, parking, at)
@@ -39,7 +39,9 @@ def is_outside_lanes(lanes, now):
 
 
 @kernel
-def _is_wrong_lane(lanes, now, lane_yaw, before, before_yaw, wrong):
+def _is_wrong_lane(
+    lanes: Lanes, now: EgoNow, lane_yaw: float, before: int, before_yaw: float, wrong: bool
+) -> bool:
     """Whether the ego is on a lane against its direction; looked at only when the lane changes."""
     lane = now.lane
     if lanes.junction[lane] >= 0:  # lanes are too tangled there
@@ -55,7 +57,7 @@ def _is_wrong_lane(lanes, now, lane_yaw, before, before_yaw, wrong):
 
 
 @kernel
-def watch_lanes(state, lanes, routes, now, lane_yaw):
+def watch_lanes(state: State, lanes: Lanes, routes: Routes, now: EgoNow, lane_yaw: float) -> None:
     """Updates the ego's lane flags, and counts the route metres passed while one is up.
 
     Args:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Driving slower than the traffic around, by Leaderboard 2.x: an event at a failed checkpoint.
 
 A route has four checkpoints, a quarter of its length apart. Since the last one, the ego's mean
@@ -11,9 +10,11 @@ the mean is over those as near as that, on the ego's level.
 
 from __future__ import annotations
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
+from di_envs.world.bodies import EgoNow
 from di_envs.world.events.rows import record
-from di_envs.world.state import CHECKPOINTS, ActorKind, EventKind
+from di_envs.world.state import CHECKPOINTS, ActorKind, EventKind, Routes, State
 
 NEAR_M = 50.0  # of the ego, within which traffic sets the pace
 SAME_LEVEL_M = 3.0
@@ -23,7 +24,7 @@ ABSENT, MIN_SPEED = int(ActorKind.ABSENT), int(EventKind.MIN_SPEED)
 
 
 @kernel
-def begin_pace(state, ego):
+def begin_pace(state: State, ego: int) -> None:
     """Clears what is remembered of an ego's pace, at the start of its route."""
     state.checkpoint[ego] = 0
     state.pace_share[ego, :] = 1.0
@@ -31,14 +32,17 @@ def begin_pace(state, ego):
 
 
 @kernel
-def _begin_stretch(state, ego, from_m):
+def _begin_stretch(state: State, ego: int, from_m: float) -> None:
+    """Forgets the speeds so far; the stretch begins at this route metre."""
     state.pace_from_m[ego] = from_m
     state.pace_ego[ego] = 0.0
     state.pace_traffic[ego] = 0.0
 
 
 @kernel
-def watch_pace(state, routes, now, vehicle_end, out, n):
+def watch_pace(
+    state: State, routes: Routes, now: EgoNow, vehicle_end: int, out: Float64, n: int
+) -> int:
     """Judges the pace at a checkpoint, then adds this tick's speeds to the next stretch.
 
     Args:
@@ -73,7 +77,7 @@ def watch_pace(state, routes, now, vehicle_end, out, n):
 
 
 @kernel
-def close_pace(state, routes, now, out, n):
+def close_pace(state: State, routes: Routes, now: EgoNow, out: Float64, n: int) -> int:
     """Judges the last stretch as the route ends: only if nearly all of it is done, as in CARLA."""
     length_m = routes.route_m[routes.start[now.ego + 1] - 1]
     if state.route_done_m[now.ego] > LAST_SHARE * length_m:
@@ -82,7 +86,7 @@ def close_pace(state, routes, now, out, n):
 
 
 @kernel
-def _judge(state, now, out, n):
+def _judge(state: State, now: EgoNow, out: Float64, n: int) -> int:
     """Keeps the ego's share of the traffic's pace; an event if it was the slower one."""
     e = now.ego
     at = state.checkpoint[e]

@@ -1,11 +1,12 @@
-# mypy: disallow_untyped_defs=False
 """How far along its route an ego has come, by Leaderboard 1.0's route completion test."""
 
 from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
+from di_envs.world.state import Routes, State
 
 WINDOW = 2  # route points looked at beyond the present one
 DONE_SHARE = 0.99  # of the route's length, more than which must lie behind
@@ -13,8 +14,8 @@ DONE_WITHIN_M = 10.0  # of its last point
 
 
 @kernel
-def is_past(points, point, x, y):
-    """Whether a position lies ahead of a route point, seen along the lane there.
+def is_past(points: Float64, point: int, x: float, y: float) -> bool:
+    """Whether a position lies ahead of one of the route points (R, 4), seen along the lane there.
 
     There is no limit to the side, so a route's lateral jumps (lane changes) and backward steps
     (where keypoints join) do no harm.
@@ -25,7 +26,7 @@ def is_past(points, point, x, y):
 
 
 @kernel
-def advance_progress(state, routes, ego):
+def advance_progress(state: State, routes: Routes, ego: int) -> None:
     """Moves an ego's route index, metres done and next target on; they never go back."""
     if state.finished[ego] != 0:
         return
@@ -43,8 +44,8 @@ def advance_progress(state, routes, ego):
 
 
 @kernel
-def route_completed(routes, ego, done_m, x, y, z):
-    """Whether more than 99 % are done and the last point is less than 10 m away."""
+def route_completed(routes: Routes, ego: int, done_m: float, x: float, y: float, z: float) -> bool:
+    """Whether more than 99 % are done and the last point is less than 10 m from (x, y, z)."""
     last = routes.start[ego + 1] - 1
     if not done_m > DONE_SHARE * routes.route_m[last]:
         return False

@@ -1,17 +1,17 @@
-# mypy: disallow_untyped_defs=False
 """Running a red light, by Leaderboard 1.0: the fine comes when the tail crosses the stop line."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from di_envs.numerics.arrays import Float64
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import LightState, SignalKind
+from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import DRIVING_MASK, nearest_lane
+from di_envs.world.bodies import EgoNow
 from di_envs.world.events.rows import record
-from di_envs.world.state import EventKind
+from di_envs.world.state import EventKind, State
 
 WITHIN_M = 15.0  # of the ego the centre of the light's trigger box must be
 TAIL_FROM = 0.8  # half lengths behind the centre at which the tail begins …
@@ -24,12 +24,15 @@ RED_LIGHT = int(EventKind.RED_LIGHT)
 
 
 @kernel
-def _side(ax, ay, bx, by, px, py):
+def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
+    """On which side of the line ab the point p lies: positive, negative, or 0 for on it."""
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
 @kernel
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+def segments_cross(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> bool:
     """Whether the segments ab and cd meet; touching counts, lying on one line does not."""
     c_side, d_side = _side(ax, ay, bx, by, cx, cy), _side(ax, ay, bx, by, dx, dy)
     a_side, b_side = _side(cx, cy, dx, dy, ax, ay), _side(cx, cy, dx, dy, bx, by)
@@ -39,7 +42,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 @kernel
-def _is_near(signals, signal, now):
+def _is_near(signals: Signals, signal: int, now: EgoNow) -> bool:
     """Whether the centre of the signal's trigger box is within 15 m of the ego."""
     dx = signals.box[signal, 0] - now.x
     dy = signals.box[signal, 1] - now.y
@@ -48,7 +51,7 @@ def _is_near(signals, signal, now):
 
 
 @kernel
-def tail_crosses(now, x, y, yaw, width_m):
+def tail_crosses(now: EgoNow, x: float, y: float, yaw: float, width_m: float) -> bool:
     """Whether the ego's tail lies across the stop line at a pose, in the direction of its lane."""
     cos, sin = math.cos(now.yaw), math.sin(now.yaw)
     line_cos, line_sin = math.cos(yaw), math.sin(yaw)
@@ -69,17 +72,19 @@ def tail_crosses(now, x, y, yaw, width_m):
 
 
 @kernel
-def _tail_is_on(lanes, now, stop):
+def _tail_is_on(lanes: Lanes, now: EgoNow, stop: int) -> bool:
     """Whether the far end of the tail is on the road and lane of the stop line."""
     far = now.half_length + TAIL_BEYOND_M
     x, y = now.x - far * math.cos(now.yaw), now.y - far * math.sin(now.yaw)
-    tail = nearest_lane(lanes, x, y, now.z, TAIL_LOOK_M, np.int64(DRIVING_MASK))[0]
+    tail = nearest_lane(lanes, x, y, now.z, TAIL_LOOK_M, as_int64(DRIVING_MASK))[0]
     same_road = tail >= 0 and lanes.road[tail] == lanes.road[stop]
     return same_road and lanes.lane_id[tail] == lanes.lane_id[stop]
 
 
 @kernel
-def detect_red_light(state, lanes, signals, now, out, n):
+def detect_red_light(
+    state: State, lanes: Lanes, signals: Signals, now: EgoNow, out: Float64, n: int
+) -> int:
     """Records the red lights that the ego's tail is crossing.
 
     Args:

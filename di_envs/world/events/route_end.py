@@ -1,13 +1,14 @@
-# mypy: disallow_untyped_defs=False
 """What ends a route in Leaderboard 1.0: completion, deviation, being blocked, the timeout."""
 
 from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
+from di_envs.world.bodies import EgoNow
 from di_envs.world.events.progress import route_completed
-from di_envs.world.state import TICK_S, EventKind
+from di_envs.world.state import TICK_S, EventKind, Routes, State
 
 WINDOW = 5  # route points looked at beyond the nearest so far
 DEVIATION_M = 30.0  # from the nearest of them, at which the route ends at once
@@ -21,8 +22,8 @@ BLOCKED, TIMEOUT = int(EventKind.BLOCKED), int(EventKind.TIMEOUT)
 
 
 @kernel
-def _nearest_ahead(points, begin, end, x, y):
-    """The nearest of the route points [begin, end), the later of equals, and its distance [m]."""
+def _nearest_ahead(points: Float64, begin: int, end: int, x: float, y: float) -> tuple[int, float]:
+    """The nearest of points (R, 4) [begin, end), the later of equals, and its distance [m]."""
     nearest, least = begin, math.inf
     for point in range(begin, end):
         dx, dy = x - points[point, 0], y - points[point, 1]
@@ -33,7 +34,7 @@ def _nearest_ahead(points, begin, end, x, y):
 
 
 @kernel
-def has_deviated(state, routes, now):
+def has_deviated(state: State, routes: Routes, now: EgoNow) -> bool:
     """Follows the nearest route point; true over 30 m away, or after too long over 15 m away."""
     first, end = routes.start[now.ego], routes.start[now.ego + 1]
     at = first + state.deviation_index[now.ego]
@@ -46,7 +47,7 @@ def has_deviated(state, routes, now):
 
 
 @kernel
-def is_blocked(state, now):
+def is_blocked(state: State, now: EgoNow) -> bool:
     """Counts the ticks that the ego has stood; true after more than 180 s."""
     standing = now.speed < BLOCKED_BELOW_MPS
     ticks = state.blocked_ticks[now.ego] + 1 if standing else 0
@@ -55,7 +56,7 @@ def is_blocked(state, now):
 
 
 @kernel
-def find_route_end(state, routes, now):
+def find_route_end(state: State, routes: Routes, now: EgoNow) -> int:
     """The EventKind that ends the route in this tick, 0 while it goes on.
 
     Of several at once, completion comes first, then deviation, blocked, timeout. A completed route

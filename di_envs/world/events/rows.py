@@ -1,8 +1,8 @@
-# mypy: disallow_untyped_defs=False
 """The rows in which kernels report events, so that a tick allocates nothing."""
 
 from __future__ import annotations
 
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
 
 # kind, ego, tick, x, y, z, other, value: the fields of `Event`
@@ -13,8 +13,19 @@ ROWS_PER_EGO = 8
 
 
 @kernel
-def record(out, n, kind, ego, tick, x, y, z, other, value):
-    """Writes row `n` of `out` (N, COLUMNS) and returns `n + 1`.
+def record(
+    out: Float64,
+    n: int,
+    kind: int,
+    ego: int,
+    tick: int,
+    x: float,
+    y: float,
+    z: float,
+    other: int,
+    value: float,
+) -> int:
+    """Writes row `n` of `out` (N, COLUMNS) and returns `n + 1`; x, y, z are in the world frame [m].
 
     Raises:
         ValueError: If `out` has no row left: it needs ROWS_PER_EGO for each ego and tick.
@@ -33,7 +44,7 @@ def record(out, n, kind, ego, tick, x, y, z, other, value):
 
 
 @kernel
-def count_rows(counts, out, begin, end):
+def count_rows(counts: Int32, out: Float64, begin: int, end: int) -> None:
     """Adds the rows [begin, end) of `out` to the egos' `counts` (E, EVENT_KINDS)."""
     for k in range(begin, end):
         counts[int(out[k, 1]), int(out[k, 0])] += 1

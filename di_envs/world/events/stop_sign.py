@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Running a stop sign, by Leaderboard 1.0, with its traps.
 
 A sign is watched once its trigger box lies on the lane ahead. The fine comes when the box is no
@@ -14,14 +13,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from di_envs.numerics.arrays import Float64
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import SignalKind
+from di_envs.town.lanes import Lanes, SignalKind, Signals
 from di_envs.town.queries import pose_at
-from di_envs.world.bodies import SAME_LEVEL_M
+from di_envs.world.bodies import SAME_LEVEL_M, EgoNow
 from di_envs.world.events.rows import record
-from di_envs.world.state import EventKind
+from di_envs.world.state import EventKind, State
 
 NEAR_M = 50.0  # from the sign, beyond which it is not looked at
 STEPS_AHEAD = 20  # lane points of one metre's step that are looked at
@@ -33,7 +32,7 @@ STOP, STOP_SIGN = int(SignalKind.STOP), int(EventKind.STOP_SIGN)
 
 
 @kernel
-def _box_extent(signals, sign):
+def _box_extent(signals: Signals, sign: int) -> tuple[float, float]:
     """Half sides along x and y [m] of the axis-parallel box around the trigger box."""
     cos, sin = abs(math.cos(signals.box[sign, 3])), abs(math.sin(signals.box[sign, 3]))
     half_length, half_width = signals.box[sign, 4], signals.box[sign, 5]
@@ -41,15 +40,26 @@ def _box_extent(signals, sign):
 
 
 @kernel
-def _inside(x, y, z, centre, extent_x, extent_y):
-    """Whether a point lies in the box around `centre` (x, y, z, …), at its level."""
+def _inside(
+    x: float, y: float, z: float, centre: Float64, extent_x: float, extent_y: float
+) -> bool:
+    """Whether a point is in the box around `centre` (x, y, z, …), of these half sides [m]."""
     beside = abs(x - centre[0]) < extent_x and abs(y - centre[1]) < extent_y
     return beside and abs(z - centre[2]) < SAME_LEVEL_M
 
 
 @kernel
-def _may_be_ahead(now, pole, box, extent_x, extent_y):
-    """Necessary conditions for a sign's box to lie on the lane ahead, quick to check."""
+def _may_be_ahead(
+    now: EgoNow, pole: Float64, box: Float64, extent_x: float, extent_y: float
+) -> bool:
+    """Necessary conditions for a sign's box to lie on the lane ahead, quick to check.
+
+    Args:
+        now: The ego now.
+        pole: (4,) x, y, z, yaw of the sign's foot.
+        box: (6,) its trigger box, as of `Signals`.
+        extent_x, extent_y: Half sides of the box around that one [m].
+    """
     dx, dy, dz = pole[0] - now.x, pole[1] - now.y, pole[2] - now.z
     if dx * dx + dy * dy + dz * dz > NEAR_M * NEAR_M:
         return False
@@ -59,7 +69,7 @@ def _may_be_ahead(now, pole, box, extent_x, extent_y):
 
 
 @kernel
-def is_ahead(lanes, signals, now, sign):
+def is_ahead(lanes: Lanes, signals: Signals, now: EgoNow, sign: int) -> bool:
     """Whether the ego, or one of the next 20 m of its lane, is in the sign's trigger box."""
     extent_x, extent_y = _box_extent(signals, sign)
     box = signals.box[sign]
@@ -86,7 +96,7 @@ def is_ahead(lanes, signals, now, sign):
 
 
 @kernel
-def _find_sign(lanes, signals, now, lane_yaw):
+def _find_sign(lanes: Lanes, signals: Signals, now: EgoNow, lane_yaw: float) -> int:
     """The first stop sign ahead, -1 where there is none or the ego heads against its lane."""
     if now.lane < 0 or math.cos(lane_yaw - now.yaw) <= 0.0:
         return -1
@@ -97,7 +107,9 @@ def _find_sign(lanes, signals, now, lane_yaw):
 
 
 @kernel
-def detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n):
+def detect_stop_sign(
+    state: State, lanes: Lanes, signals: Signals, now: EgoNow, lane_yaw: float, out: Float64, n: int
+) -> int:
     """Follows the stop sign ahead and records it when it was run.
 
     Args:
@@ -112,7 +124,7 @@ def detect_stop_sign(state, lanes, signals, now, lane_yaw, out, n):
     Returns:
         The number of rows in use.
     """
-    sign = np.int64(state.stop_target[now.ego])
+    sign = as_int64(state.stop_target[now.ego])
     if sign < 0:
         state.stop_target[now.ego] = _find_sign(lanes, signals, now, lane_yaw)
         return n

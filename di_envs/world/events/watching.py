@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """All events of CARLA Leaderboard 1.0 for one ego and tick, each by the rule of its own module.
 
 Source: CARLA leaderboard and scenario_runner, branches `leaderboard-1.0`, of which the geometry,
@@ -10,9 +9,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from di_envs.numerics.arrays import Float64
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import Lanes, Signals
 from di_envs.town.queries import pose_at
 from di_envs.world.bodies import EgoNow
 from di_envs.world.events.lane_keeping import watch_lanes
@@ -21,13 +21,13 @@ from di_envs.world.events.red_light import detect_red_light
 from di_envs.world.events.route_end import find_route_end
 from di_envs.world.events.rows import count_rows, record
 from di_envs.world.events.stop_sign import detect_stop_sign
-from di_envs.world.state import EventKind
+from di_envs.world.state import EventKind, Routes, State
 
 OUTSIDE_LANES = int(EventKind.OUTSIDE_LANES)
 
 
 @kernel
-def begin_events(state, ego):
+def begin_events(state: State, ego: int) -> None:
     """Clears what the events remember of an ego, at the start of its route."""
     state.last_collision_actor[ego] = -1
     state.last_collision_tick[ego] = 0
@@ -52,7 +52,16 @@ def begin_events(state, ego):
 
 
 @kernel
-def detect_events(state, lanes, signals, routes, ego, vehicle_end, out, n):
+def detect_events(
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    routes: Routes,
+    ego: int,
+    vehicle_end: int,
+    out: Float64,
+    n: int,
+) -> int:
     """Looks for every event but collisions, after `locate_ego` and `advance_progress`.
 
     Args:
@@ -72,15 +81,15 @@ def detect_events(state, lanes, signals, routes, ego, vehicle_end, out, n):
         return n
     # integers of one width, so that what reads them is compiled once
     now = EgoNow(
-        np.int64(ego),
-        state.tick[()],
+        as_int64(ego),
+        int(state.tick[()]),
         state.x[ego],
         state.y[ego],
         state.z[ego],
         state.yaw[ego],
         state.speed[ego],
         state.half_length[ego],
-        np.int64(state.lane[ego]),
+        as_int64(state.lane[ego]),
         state.lane_m[ego],
     )
     before = n
@@ -99,7 +108,7 @@ def detect_events(state, lanes, signals, routes, ego, vehicle_end, out, n):
 
 
 @kernel
-def _end_route(now, reason, outside_m, out, n):
+def _end_route(now: EgoNow, reason: int, outside_m: float, out: Float64, n: int) -> int:
     """Records the metres outside lanes, if there are any, and why the route ended."""
     if outside_m > 0.0:
         n = record(out, n, OUTSIDE_LANES, now.ego, now.tick, now.x, now.y, now.z, -1, outside_m)

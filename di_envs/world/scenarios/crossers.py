@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Scenarios 3 and 4: somebody crosses right before the ego, from behind something or after a turn.
 
 He waits beside the road until the ego is near, then goes straight across to the far side and is
@@ -12,8 +11,11 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
-from di_envs.town.queries import lanes_below_box, project_to_lane
+from di_envs.town.lanes import Lanes, Signals
+from di_envs.town.lanes_below import lanes_below_box
+from di_envs.town.queries import project_to_lane
 from di_envs.world.bodies import LARGEST_M, SAME_LEVEL_M, Box, box_of, overlap
 from di_envs.world.contact import DOWN
 from di_envs.world.scenarios.steps import draw_of, end_scenario, go_to, put_actor
@@ -21,9 +23,10 @@ from di_envs.world.scenarios.tables import (
     MACHINE_HALF_LENGTH_M,
     MACHINE_HALF_WIDTH_M,
     MACHINE_HEIGHT_M,
+    ScenarioTables,
 )
-from di_envs.world.state import OCCUPIED_LANES, TICK_S, ActorKind
-from di_envs.world.traffic.occupancy import insert_body
+from di_envs.world.state import OCCUPIED_LANES, TICK_S, ActorKind, State
+from di_envs.world.traffic.occupancy import Occupancy, insert_body
 from di_envs.world.walkers.crossing import BODY_M, is_in_the_way, is_vehicle
 from di_envs.world.walkers.strolling import HEIGHT_M, LIE_TICKS
 
@@ -46,7 +49,9 @@ VENDING_MACHINE = int(ActorKind.VENDING_MACHINE)
 
 
 @kernel
-def begin_crossing(state, tables, signals, trigger, ego):
+def begin_crossing(
+    state: State, tables: ScenarioTables, signals: Signals, trigger: int, ego: int
+) -> None:
     """Puts somebody, and what hides him, beside the road where there is room."""
     actor = tables.first_actor[trigger]
     slot = actor - tables.first_actor[0]
@@ -99,7 +104,14 @@ def begin_crossing(state, tables, signals, trigger, ego):
 
 
 @kernel
-def _free_shift(state, tables, trigger, slot, half_length, half_width):
+def _free_shift(
+    state: State,
+    tables: ScenarioTables,
+    trigger: int,
+    slot: int,
+    half_length: float,
+    half_width: float,
+) -> float:
     """How far along the road the first place free of others is [m]; -1 where none is near."""
     along_x, along_y = _along_road(tables.pose[slot])
     for k in range(TRIES):
@@ -116,14 +128,23 @@ def _free_shift(state, tables, trigger, slot, half_length, half_width):
 
 
 @kernel
-def _along_road(pose):
-    """The direction in which the road runs before somebody who faces it from its right side."""
+def _along_road(pose: Float64) -> tuple[float, float]:
+    """The direction in which the road runs before somebody who faces it from its right side.
+
+    Args:
+        pose: (4,) x, y, z, yaw of him.
+
+    Returns:
+        (x, y) of a unit vector, world frame.
+    """
     return -math.sin(pose[3]), math.cos(pose[3])
 
 
 @kernel
-def _is_place_free(state, pose, dx, dy, half_length, half_width):
-    """Whether nobody's box reaches into one at a pose, moved by (dx, dy)."""
+def _is_place_free(
+    state: State, pose: Float64, dx: float, dy: float, half_length: float, half_width: float
+) -> bool:
+    """Whether nobody's box reaches into one at a pose (4,) x, y, z, yaw, moved by (dx, dy) [m]."""
     x, y = pose[0] + dx, pose[1] + dy
     place = Box(x, y, pose[2], pose[3], half_length, half_width)
     for other in range(state.kind.size):
@@ -139,7 +160,9 @@ def _is_place_free(state, pose, dx, dy, half_length, half_width):
 
 
 @kernel
-def _is_held(state, actor, ego, step_m, vehicle_end, walker_end):
+def _is_held(
+    state: State, actor: int, ego: int, step_m: float, vehicle_end: int, walker_end: int
+) -> bool:
     """Whether a step would go into a vehicle's side, into the way of one that is not his ego, or
     into one of the walkers, who are the actors behind `vehicle_end`."""
     cos, sin = math.cos(state.yaw[actor]), math.sin(state.yaw[actor])
@@ -176,7 +199,15 @@ def _is_held(state, actor, ego, step_m, vehicle_end, walker_end):
 
 
 @kernel
-def move_crosser(state, tables, signals, trigger, ego, vehicle_end, walker_end):
+def move_crosser(
+    state: State,
+    tables: ScenarioTables,
+    signals: Signals,
+    trigger: int,
+    ego: int,
+    vehicle_end: int,
+    walker_end: int,
+) -> None:
     """One tick of who crosses; at the far side, or when nothing moves any more, he is gone."""
     actor = tables.first_actor[trigger]
     if state.kind[actor] == ABSENT:  # somebody took him away
@@ -207,14 +238,21 @@ def move_crosser(state, tables, signals, trigger, ego, vehicle_end, walker_end):
 
 
 @kernel
-def watch_crossing(state, tables, trigger, done_m):
+def watch_crossing(state: State, tables: ScenarioTables, trigger: int, done_m: float) -> None:
     """Lets him go once the ego is near enough."""
     if state.scenario_step[trigger] == WAITING and done_m >= tables.begin_m[trigger]:
         go_to(state, trigger, CROSSING)
 
 
 @kernel
-def occupy_lanes(occupancy, state, tables, lanes, trigger, below):
+def occupy_lanes(
+    occupancy: Occupancy,
+    state: State,
+    tables: ScenarioTables,
+    lanes: Lanes,
+    trigger: int,
+    below: Int32,
+) -> None:
     """Enters who crosses into the lists of the lanes that he is on or comes to within a second.
 
     Args:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Scenario 1, control loss: debris on the road, over which steering and throttle are disturbed.
 
 Three patches lie 14, 48 and 74 m ahead, flat: one drives over them. While the ego is within 2 m of
@@ -14,9 +13,11 @@ import math
 
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, normal
+from di_envs.town.lanes import Signals
 from di_envs.world.bodies import SAME_LEVEL_M
 from di_envs.world.scenarios.steps import ITEMS, draw_of, end_scenario, go_to, put_actor
-from di_envs.world.state import ActorKind
+from di_envs.world.scenarios.tables import ScenarioTables
+from di_envs.world.state import ActorKind, State
 
 RUNNING = 1
 WITHIN_M = 2.0  # of a patch's middle, the ego's middle
@@ -30,7 +31,7 @@ STEER_STREAM, THROTTLE_STREAM = int(Stream.STEER_NOISE), int(Stream.THROTTLE_NOI
 
 
 @kernel
-def begin_debris(state, tables, trigger):
+def begin_debris(state: State, tables: ScenarioTables, trigger: int) -> None:
     """Lays the patches down."""
     first = tables.first_actor[0]
     for actor in range(tables.first_actor[trigger], tables.first_actor[trigger + 1]):
@@ -52,7 +53,7 @@ def begin_debris(state, tables, trigger):
 
 
 @kernel
-def disturb_ego(state, tables, trigger, ego):
+def disturb_ego(state: State, tables: ScenarioTables, trigger: int, ego: int) -> None:
     """Adds this tick's noise where the ego is over a patch."""
     first = tables.first_actor[trigger]
     for actor in range(first, tables.first_actor[trigger + 1]):
@@ -62,7 +63,7 @@ def disturb_ego(state, tables, trigger, ego):
         if abs(state.z[actor] - state.z[ego]) > SAME_LEVEL_M:
             continue
         patch = actor - first
-        seed, tick = state.seed[()], state.tick[()]
+        seed, tick = int(state.seed[()]), int(state.tick[()])
         key = ((trigger - tables.start[ego]) * ITEMS + patch) * 1024 + ego
         steer = STEER_DEVIATION * normal(seed, STEER_STREAM, tick, key)
         throttle = THROTTLE_DEVIATION * normal(seed, THROTTLE_STREAM, tick, key)
@@ -73,7 +74,9 @@ def disturb_ego(state, tables, trigger, ego):
 
 
 @kernel
-def watch_debris(state, tables, signals, trigger, done_m):
+def watch_debris(
+    state: State, tables: ScenarioTables, signals: Signals, trigger: int, done_m: float
+) -> None:
     """Clears the road once the ego has come far enough."""
     if done_m >= tables.end_m[trigger]:
         end_scenario(state, tables, signals, trigger)

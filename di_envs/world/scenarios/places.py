@@ -14,9 +14,9 @@ import numpy as np
 
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.town.lanes import LaneKind, SignalKind
+from di_envs.town.lanes_below import lanes_below_box
 from di_envs.town.plan import RoutePlan
 from di_envs.town.queries import (
-    lanes_below_box,
     nearest_lane,
     pose_at,
     project_to_lane,
@@ -73,9 +73,7 @@ def find_kerb(town: Town, lane: int, station_m: float) -> Kerb:
     width = float(width_at(lanes, lane, station_m))
     aside = 0.5 * width + BESIDE_M
     at = x - aside * math.sin(yaw), y + aside * math.cos(yaw)
-    beside, there, lateral, away = nearest_lane(
-        lanes, at[0], at[1], z, BESIDE_M, np.int64(_PARKING_MASK)
-    )
+    beside, there, lateral, away = nearest_lane(lanes, at[0], at[1], z, BESIDE_M, _PARKING_MASK)
     if beside >= 0 and away - abs(lateral) < ABREAST_M:
         broad = float(width_at(lanes, beside, there))
         if broad > PARKING_WIDTH_M - 0.05 or lanes.kind[beside] == LaneKind.PARKING:

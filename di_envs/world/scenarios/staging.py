@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """The Leaderboard's scenarios 1, 3, 4, 7, 8, 9 and 10: what triggers them, and who acts each tick.
 
 Each trigger of an ego's plan has a small state machine (`State.scenario_step`), run once; those of
@@ -12,7 +11,9 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import Lanes, Signals
 from di_envs.world.events.rows import record
 from di_envs.world.scenarios.crossers import (
     begin_crossing,
@@ -23,8 +24,9 @@ from di_envs.world.scenarios.crossers import (
 from di_envs.world.scenarios.debris import begin_debris, disturb_ego, watch_debris
 from di_envs.world.scenarios.lights import begin_lights, watch_lights
 from di_envs.world.scenarios.steps import end_scenario
-from di_envs.world.scenarios.tables import AHEAD, DONE
-from di_envs.world.state import ActorKind, EventKind
+from di_envs.world.scenarios.tables import AHEAD, DONE, ScenarioTables
+from di_envs.world.state import ActorKind, EventKind, Routes, State
+from di_envs.world.traffic.occupancy import Occupancy
 
 TRIGGER_M = 1.5  # from the trigger, within which the route point nearest the ego must lie
 WINDOW = 5  # route points looked at beyond the nearest one so far
@@ -36,25 +38,34 @@ FIRST_LIGHTS, LAST_LIGHTS = 7, 9
 
 
 @kernel
-def occupy_crossings(occupancy, state, tables, lanes, below):
-    """Enters who crosses a road into the lists that traffic reads; after `fill_occupancy`."""
+def occupy_crossings(
+    occupancy: Occupancy, state: State, tables: ScenarioTables, lanes: Lanes, below: Int32
+) -> None:
+    """Enters who crosses a road into the lists that traffic reads; after `fill_occupancy`.
+
+    `below` is scratch, (OCCUPIED_LANES,).
+    """
     for trigger in range(tables.type.size):
         if _is_under_way(state, trigger) and _crosses(tables, trigger):
             occupy_lanes(occupancy, state, tables, lanes, trigger, below)
 
 
 @kernel
-def _is_under_way(state, trigger):
+def _is_under_way(state: State, trigger: int) -> bool:
+    """Whether a trigger's scenario has begun and is not over."""
     return AHEAD < state.scenario_step[trigger] < DONE
 
 
 @kernel
-def _crosses(tables, trigger):
+def _crosses(tables: ScenarioTables, trigger: int) -> bool:
+    """Whether somebody crosses the road in a trigger's scenario."""
     return tables.type[trigger] == HIDDEN or tables.type[trigger] == CYCLIST
 
 
 @kernel
-def move_scenarios(state, tables, signals, vehicle_end, walker_end):
+def move_scenarios(
+    state: State, tables: ScenarioTables, signals: Signals, vehicle_end: int, walker_end: int
+) -> None:
     """Moves the actors of scenarios and sets the noise of controls; before egos move."""
     for ego in range(state.throttle.size):
         begin, end = tables.start[ego], tables.start[ego + 1]
@@ -70,7 +81,15 @@ def move_scenarios(state, tables, signals, vehicle_end, walker_end):
 
 
 @kernel
-def watch_scenarios(state, tables, signals, routes, ego, out, n):
+def watch_scenarios(
+    state: State,
+    tables: ScenarioTables,
+    signals: Signals,
+    routes: Routes,
+    ego: int,
+    out: Float64,
+    n: int,
+) -> int:
     """Triggers scenarios and lets those under way see where the ego is; after it is located.
 
     At most one is triggered in a tick.
@@ -110,7 +129,7 @@ def watch_scenarios(state, tables, signals, routes, ego, out, n):
                 n,
                 SCENARIO,
                 ego,
-                state.tick[()],
+                int(state.tick[()]),
                 at[0],
                 at[1],
                 at[2],
@@ -121,7 +140,7 @@ def watch_scenarios(state, tables, signals, routes, ego, out, n):
 
 
 @kernel
-def _follow_route(state, routes, ego):
+def _follow_route(state: State, routes: Routes, ego: int) -> None:
     """Moves the nearest route point on, looking at the present one and the next few."""
     first, end = routes.start[ego], routes.start[ego + 1]
     here = first + state.nearest_index[ego]
@@ -137,7 +156,10 @@ def _follow_route(state, routes, ego):
 
 
 @kernel
-def _is_reached(state, tables, routes, trigger, ego):
+def _is_reached(
+    state: State, tables: ScenarioTables, routes: Routes, trigger: int, ego: int
+) -> bool:
+    """Whether the route point nearest the ego is close to a trigger's."""
     here = routes.points[routes.start[ego] + state.nearest_index[ego]]
     there = routes.points[routes.start[ego] + tables.point[trigger]]
     dx, dy, dz = here[0] - there[0], here[1] - there[1], here[2] - there[2]
@@ -145,7 +167,8 @@ def _is_reached(state, tables, routes, trigger, ego):
 
 
 @kernel
-def _begin(state, tables, signals, trigger, ego):
+def _begin(state: State, tables: ScenarioTables, signals: Signals, trigger: int, ego: int) -> None:
+    """Begins a trigger's scenario, by its family."""
     kind = tables.type[trigger]
     if kind == DEBRIS:
         begin_debris(state, tables, trigger)
@@ -158,7 +181,10 @@ def _begin(state, tables, signals, trigger, ego):
 
 
 @kernel
-def _watch(state, tables, signals, trigger, ego, done_m):
+def _watch(
+    state: State, tables: ScenarioTables, signals: Signals, trigger: int, ego: int, done_m: float
+) -> None:
+    """Lets a scenario under way see where the ego is: `done_m` metres along its route."""
     kind = tables.type[trigger]
     if kind == DEBRIS:
         watch_debris(state, tables, signals, trigger, done_m)
@@ -169,7 +195,7 @@ def _watch(state, tables, signals, trigger, ego, done_m):
 
 
 @kernel
-def _end_all(state, tables, signals, begin, end):
+def _end_all(state: State, tables: ScenarioTables, signals: Signals, begin: int, end: int) -> None:
     """An ego whose route has ended leaves nothing behind."""
     for trigger in range(begin, end):
         if _is_under_way(state, trigger):

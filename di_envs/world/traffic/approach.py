@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """What a vehicle meets at the end of its lane: the way ahead, the line, the light or the sign."""
 
 from __future__ import annotations
@@ -10,9 +9,9 @@ from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import LightState, SignalKind, Turn
+from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals, Turn
 from di_envs.world.lights import GREEN_TICKS, YELLOW_TICKS
-from di_envs.world.state import PATH_LANES, TICK_S
+from di_envs.world.state import PATH_LANES, TICK_S, State
 
 YELLOW_BRAKING_MPS2 = 4.0  # harder than this nobody brakes for a yellow light …
 RED_BRAKING_MPS2 = 5.5  # … unless it would be red by the time that they come to the line
@@ -51,7 +50,9 @@ def make_requests(actors: int) -> Requests:
 
 
 @kernel
-def find_approach(requests, state, lanes, actor, look_m):
+def find_approach(
+    requests: Requests, state: State, lanes: Lanes, actor: int, look_m: float
+) -> None:
     """Notes the next junction lane on a vehicle's path that it is not yet on, within `look_m`."""
     requests.way[actor] = -1
     distance = lanes.length_m[state.lane[actor]] - state.lane_m[actor] - state.half_length[actor]
@@ -70,7 +71,7 @@ def find_approach(requests, state, lanes, actor, look_m):
 
 
 @kernel
-def must_stop(state, lanes, signals, actor, approach):
+def must_stop(state: State, lanes: Lanes, signals: Signals, actor: int, approach: int) -> bool:
     """Whether the signal at the end of an approach lane keeps a vehicle from asking to enter."""
     line = lanes.stop_line[approach]
     if line < 0:
@@ -84,7 +85,9 @@ def must_stop(state, lanes, signals, actor, approach):
 
 
 @kernel
-def priority_of(state, lanes, signals, approach, way, waited_ticks):
+def priority_of(
+    state: State, lanes: Lanes, signals: Signals, approach: int, way: int, waited_ticks: int
+) -> int:
     """0 goes before 1 (turns left across others) before 2 (has a sign); patience ends."""
     line = lanes.stop_line[approach]
     if line >= 0 and signals.kind[signals.stop_signal[line]] != _LIGHT:
@@ -93,7 +96,7 @@ def priority_of(state, lanes, signals, approach, way, waited_ticks):
 
 
 @kernel
-def yellow_left_s(state, lanes, signals, approach):
+def yellow_left_s(state: State, lanes: Lanes, signals: Signals, approach: int) -> float:
     """Seconds until the light at the end of an approach lane is red; 0 once it is, and at signs."""
     signal = signals.stop_signal[lanes.stop_line[approach]]
     if state.light[signal] != _YELLOW:
@@ -106,7 +109,7 @@ def yellow_left_s(state, lanes, signals, approach):
 
 
 @kernel
-def can_stop(speed, distance, yellow_left_s):
+def can_stop(speed: float, distance: float, yellow_left_s: float) -> bool:
     """Whether a vehicle can still stop before its line, hard if it would come there at red."""
     if speed < 1.0:
         return distance > 0.1 * speed
@@ -116,8 +119,16 @@ def can_stop(speed, distance, yellow_left_s):
 
 
 @kernel
-def note_stop(state, lanes, signals, actor, approach, distance, tick):
-    """Remembers when a vehicle came to the line, and that it stopped there."""
+def note_stop(
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    actor: int,
+    approach: int,
+    distance: float,
+    tick: int,
+) -> None:
+    """Remembers when a vehicle, `distance` before the line, came there, and that it stopped."""
     if distance < 15.0 and state.arrival_tick[actor] < 0:
         state.arrival_tick[actor] = tick
     if state.speed[actor] < 0.1 and distance < STOP_ZONE_M:
@@ -125,7 +136,7 @@ def note_stop(state, lanes, signals, actor, approach, distance, tick):
 
 
 @kernel
-def note_ego_arrival(state, lanes, ego):
+def note_ego_arrival(state: State, lanes: Lanes, ego: int) -> None:
     """Remembers since when an ego has stood first at a stop line, as it does for vehicles."""
     lane = state.lane[ego]
     if lane < 0 or lanes.junction[lane] >= 0:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How a driver keeps behind another: the Intelligent Driver Model, and what is safe besides.
 
 Source: Intelligent Driver Model (Treiber, Hennecke, Helbing: Congested traffic states in empirical
@@ -28,7 +27,9 @@ NO_LEADER_M = 1e9  # the gap on a free road
 
 
 @kernel
-def idm_acceleration(speed, desired_speed, gap_m, leader_speed):
+def idm_acceleration(
+    speed: float, desired_speed: float, gap_m: float, leader_speed: float
+) -> float:
     """The Intelligent Driver Model's acceleration, as highway-env has it.
 
     Args:
@@ -56,7 +57,9 @@ def idm_acceleration(speed, desired_speed, gap_m, leader_speed):
 
 
 @kernel
-def safe_speed(gap_m, leader_speed, braking_mps2, leader_braking_mps2):
+def safe_speed(
+    gap_m: float, leader_speed: float, braking_mps2: float, leader_braking_mps2: float
+) -> float:
     """The highest speed for the next tick from which one can stop behind the leader.
 
     It holds for a leader that brakes at `leader_braking_mps2` from now on, and for oneself braking

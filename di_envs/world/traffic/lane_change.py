@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Lane changes of traffic: MOBIL, with highway-env's parameters.
 
 Source: Kesting, Treiber, Helbing: General lane-changing model MOBIL for car-following models,
@@ -8,8 +7,9 @@ Transportation Research Record 1999 (2007); parameters and form of highway-env's
 from __future__ import annotations
 
 from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import Lanes
 from di_envs.town.queries import project_to_lane
-from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.traffic.car_following import (
     ACCELERATION_MPS2,
     MAX_BRAKING_MPS2,
@@ -17,9 +17,16 @@ from di_envs.world.traffic.car_following import (
     idm_acceleration,
     safe_speed,
 )
-from di_envs.world.traffic.decisions import SAFE_GAP_M, allowed_speed
 from di_envs.world.traffic.motion import choose_path
-from di_envs.world.traffic.occupancy import body_ahead, body_behind, find_leader, insert_body
+from di_envs.world.traffic.occupancy import (
+    Occupancy,
+    body_ahead,
+    body_behind,
+    find_leader,
+    insert_body,
+)
+from di_envs.world.traffic.speed_choice import SAFE_GAP_M, allowed_speed
+from di_envs.world.traffic.tables import TrafficTables
 
 MIN_GAIN_MPS2 = 0.2
 MAX_BRAKING_IMPOSED_MPS2 = 2.0
@@ -35,7 +42,14 @@ _CHANGE_LEFT, _CHANGE_RIGHT = 1, 2
 
 
 @kernel
-def change_lanes(occupancy, state, lanes, tables, egos, vehicle_end):
+def change_lanes(
+    occupancy: Occupancy,
+    state: State,
+    lanes: Lanes,
+    tables: TrafficTables,
+    egos: int,
+    vehicle_end: int,
+) -> None:
     """Lets each vehicle, once a second, begin a lane change that MOBIL recommends."""
     for actor in range(egos, vehicle_end):
         if (state.tick[()] + actor) % DELAY_TICKS != 0 or state.kind[actor] == _ABSENT:
@@ -58,7 +72,9 @@ def change_lanes(occupancy, state, lanes, tables, egos, vehicle_end):
 
 
 @kernel
-def _mobil(occupancy, state, lanes, tables, actor, target):
+def _mobil(
+    occupancy: Occupancy, state: State, lanes: Lanes, tables: TrafficTables, actor: int, target: int
+) -> bool:
     """Whether a change gains enough and is safe for the new follower and for the vehicle itself."""
     speed = state.speed[actor]
     half = state.half_length[actor]
@@ -88,7 +104,9 @@ def _mobil(occupancy, state, lanes, tables, actor, target):
 
 
 @kernel
-def _follower_is_safe(occupancy, state, lanes, actor, target, s):
+def _follower_is_safe(
+    occupancy: Occupancy, state: State, lanes: Lanes, actor: int, target: int, s: float
+) -> bool:
     """Whether the vehicle behind on the target lane need not brake hard."""
     rear = s - state.half_length[actor]
     behind = body_behind(occupancy, target, actor, s)
@@ -114,7 +132,9 @@ def _follower_is_safe(occupancy, state, lanes, actor, target, s):
 
 
 @kernel
-def _begin_change(occupancy, state, lanes, tables, actor, target):
+def _begin_change(
+    occupancy: Occupancy, state: State, lanes: Lanes, tables: TrafficTables, actor: int, target: int
+) -> None:
     """Moves a vehicle to its new lane, its body still where it was, seen from both lanes."""
     s, lateral = project_to_lane(lanes, target, state.x[actor], state.y[actor])
     half = state.half_length[actor]

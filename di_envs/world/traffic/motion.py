@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """How vehicles move along their lanes: drawn ways, lane changes under way, axles on the lane."""
 
 from __future__ import annotations
@@ -9,9 +8,12 @@ import numpy as np
 
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, keyed_hash
+from di_envs.town.lanes import Lanes
 from di_envs.town.queries import pose_at
-from di_envs.world.state import PATH_LANES, TICK_S, ActorKind
+from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State
+from di_envs.world.traffic.approach import Requests
 from di_envs.world.traffic.car_following import EMERGENCY_BRAKING_MPS2
+from di_envs.world.traffic.tables import TrafficTables
 
 STILL_MPS = 0.1
 LATERAL_SPEED_MPS = 1.2  # of a lane change
@@ -26,7 +28,9 @@ _TURN_STREAM = int(Stream.TRAFFIC_TURN)
 
 
 @kernel
-def next_lane(lanes, tables, lane, seed, tick, actor, step):
+def next_lane(
+    lanes: Lanes, tables: TrafficTables, lane: int, seed: int, tick: int, actor: int, step: int
+) -> int:
     """Draws where a vehicle goes on at the end of a lane; -1 where no usable lane follows."""
     count = 0
     for k in range(lanes.successor_start[lane], lanes.successor_start[lane + 1]):
@@ -44,19 +48,25 @@ def next_lane(lanes, tables, lane, seed, tick, actor, step):
 
 
 @kernel
-def choose_path(state, lanes, tables, actor, known):
+def choose_path(state: State, lanes: Lanes, tables: TrafficTables, actor: int, known: int) -> None:
     """Fills a vehicle's path behind its first `known` lanes with drawn ones."""
+    seed, tick = int(state.seed[()]), int(state.tick[()])
     for step in range(known, PATH_LANES):
-        last = state.path[actor, step - 1]
-        state.path[actor, step] = (
-            -1
-            if last < 0
-            else next_lane(lanes, tables, last, state.seed[()], state.tick[()], actor, step)
-        )
+        last, ahead = state.path[actor, step - 1], -1
+        if last >= 0:
+            ahead = next_lane(lanes, tables, last, seed, tick, actor, step)
+        state.path[actor, step] = ahead
 
 
 @kernel
-def take_another_way(state, lanes, tables, requests, egos, vehicle_end):
+def take_another_way(
+    state: State,
+    lanes: Lanes,
+    tables: TrafficTables,
+    requests: Requests,
+    egos: int,
+    vehicle_end: int,
+) -> None:
     """Who has long stood before a full exit draws a new path: so a ring of full streets dissolves.
 
     In such a ring everybody waits for room in the next street, and none of them for a mistake.
@@ -69,8 +79,13 @@ def take_another_way(state, lanes, tables, requests, egos, vehicle_end):
 
 
 @kernel
-def move_vehicle(state, lanes, tables, actor, acceleration, cap):
-    """Moves a vehicle along its path for one tick and places its body."""
+def move_vehicle(
+    state: State, lanes: Lanes, tables: TrafficTables, actor: int, acceleration: float, cap: float
+) -> None:
+    """Moves a vehicle along its path for one tick and places its body.
+
+    It gains `acceleration` [m/s2], up to the speed `cap` [m/s], but brakes no harder than it can.
+    """
     speed = state.speed[actor]
     moved = min(speed + acceleration * TICK_S, cap)
     moved = max(moved, speed - EMERGENCY_BRAKING_MPS2 * TICK_S, 0.0)
@@ -94,7 +109,8 @@ def move_vehicle(state, lanes, tables, actor, acceleration, cap):
 
 
 @kernel
-def _enter_next_lane(state, lanes, tables, actor):
+def _enter_next_lane(state: State, lanes: Lanes, tables: TrafficTables, actor: int) -> None:
+    """Goes on to the path's next lane at the end of one; stops where there is none."""
     lane = state.lane[actor]
     if state.lane_m[actor] < lanes.length_m[lane]:
         return
@@ -113,7 +129,7 @@ def _enter_next_lane(state, lanes, tables, actor):
 
 
 @kernel
-def _drift_to_centre(state, actor, speed):
+def _drift_to_centre(state: State, actor: int, speed: float) -> None:
     """Goes on with a lane change: sideways no faster than the forward speed lets it look real."""
     offset = state.lateral_m[actor]
     if offset == 0.0:
@@ -127,7 +143,8 @@ def _drift_to_centre(state, actor, speed):
 
 
 @kernel
-def _indicator(state, lanes, actor):
+def _indicator(state: State, lanes: Lanes, actor: int) -> int:
+    """-1 left, 0 off, 1 right: for a lane change under way, or a turn taken or soon to come."""
     if state.lateral_m[actor] != 0.0:
         return 1 if state.lateral_m[actor] < 0.0 else -1
     lane = state.lane[actor]
@@ -139,7 +156,7 @@ def _indicator(state, lanes, actor):
 
 
 @kernel
-def place_vehicle(state, lanes, actor):
+def place_vehicle(state: State, lanes: Lanes, actor: int) -> None:
     """Sets a vehicle's pose: its axles run on the lane, so long bodies swing as they do."""
     axle = 0.6 * state.half_length[actor]
     front_x, front_y, front_z, _ = _point_on_path(state, lanes, actor, axle)
@@ -159,7 +176,10 @@ def place_vehicle(state, lanes, actor):
 
 
 @kernel
-def _point_on_path(state, lanes, actor, ahead_m):
+def _point_on_path(
+    state: State, lanes: Lanes, actor: int, ahead_m: float
+) -> tuple[float, float, float, float]:
+    """(x, y, z, yaw) of its lanes' centre `ahead_m` before a vehicle's middle, or behind it."""
     s = state.lane_m[actor] + ahead_m
     lane = state.lane[actor]
     if s < 0.0 and state.previous_lane[actor] >= 0:

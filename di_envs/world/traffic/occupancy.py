@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Who is where on the lanes: per tick, each lane's bodies in order, and the search for a leader.
 
 A body lies on every lane that it overlaps: its own, the one its tail has not left, the one a lane
@@ -13,11 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Int32
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
+from di_envs.town.lanes import Lanes
 from di_envs.town.queries import project_to_lane
-from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind
+from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind, State
 from di_envs.world.traffic.car_following import NO_LEADER_M
+from di_envs.world.traffic.tables import TrafficTables
 
 _ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
@@ -58,8 +60,10 @@ def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
 
 
 @kernel
-def insert_body(occupancy, lane, actor, rear_m, front_m, speed):
-    """Adds a body to a lane's list, in order."""
+def insert_body(
+    occupancy: Occupancy, lane: int, actor: int, rear_m: float, front_m: float, speed: float
+) -> None:
+    """Adds a body, between two stations of a lane, to the lane's list, in order."""
     body = occupancy.size[0]
     occupancy.size[0] = body + 1
     occupancy.actor[body] = actor
@@ -79,7 +83,9 @@ def insert_body(occupancy, lane, actor, rear_m, front_m, speed):
 
 
 @kernel
-def fill_occupancy(occupancy, state, lanes, egos, vehicle_end):
+def fill_occupancy(
+    occupancy: Occupancy, state: State, lanes: Lanes, egos: int, vehicle_end: int
+) -> None:
     """Rebuilds all lists from the state: egos [0, egos), vehicles [egos, vehicle_end)."""
     occupancy.first[:] = -1
     occupancy.holder[:] = -1
@@ -101,7 +107,7 @@ def fill_occupancy(occupancy, state, lanes, egos, vehicle_end):
 
 
 @kernel
-def insert_vehicle(occupancy, state, lanes, actor):
+def insert_vehicle(occupancy: Occupancy, state: State, lanes: Lanes, actor: int) -> None:
     """Adds a vehicle on its own lane, behind it and beside it, as far as its body reaches."""
     lane = state.lane[actor]
     s, half, speed = state.lane_m[actor], state.half_length[actor], state.speed[actor]
@@ -117,7 +123,8 @@ def insert_vehicle(occupancy, state, lanes, actor):
 
 
 @kernel
-def _insert_free_body(occupancy, state, lanes, actor):
+def _insert_free_body(occupancy: Occupancy, state: State, lanes: Lanes, actor: int) -> None:
+    """Adds an ego on each driving lane below its box, as long as it is along that lane."""
     half_length, half_width = state.half_length[actor], state.half_width[actor]
     for k in range(OCCUPIED_LANES):
         lane = state.occupied[actor, k]
@@ -134,7 +141,7 @@ def _insert_free_body(occupancy, state, lanes, actor):
 
 
 @kernel
-def body_ahead(occupancy, lane, actor, s):
+def body_ahead(occupancy: Occupancy, lane: int, actor: int, s: float) -> int:
     """The first body on a lane, not the actor's own, with its middle ahead of station s; or -1."""
     body = occupancy.first[lane]
     while body >= 0:
@@ -147,7 +154,7 @@ def body_ahead(occupancy, lane, actor, s):
 
 
 @kernel
-def body_behind(occupancy, lane, actor, s):
+def body_behind(occupancy: Occupancy, lane: int, actor: int, s: float) -> int:
     """The last body on a lane, not the actor's own, whose middle lies behind station s; or -1."""
     found = -1
     body = occupancy.first[lane]
@@ -160,7 +167,9 @@ def body_behind(occupancy, lane, actor, s):
 
 
 @kernel
-def _nearest_sibling(occupancy, tables, lane, actor, s, best_rear):
+def _nearest_sibling(
+    occupancy: Occupancy, tables: TrafficTables, lane: int, actor: int, s: float, best_rear: float
+) -> int:
     """A body on a junction lane that forks from the same approach lane, where both overlap."""
     found = -1
     for k in range(tables.sibling_start[lane], tables.sibling_start[lane + 1]):
@@ -181,7 +190,16 @@ def _nearest_sibling(occupancy, tables, lane, actor, s, best_rear):
 
 
 @kernel
-def find_leader(occupancy, lanes, tables, path, actor, s, front, look_m):
+def find_leader(
+    occupancy: Occupancy,
+    lanes: Lanes,
+    tables: TrafficTables,
+    path: Int32,
+    actor: int,
+    s: float,
+    front: float,
+    look_m: float,
+) -> tuple[float, float, int]:
     """The first body ahead along a path of lanes.
 
     Args:

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Who may enter a junction: a vehicle goes in only with a grant for its way through.
 
 A grant is given when the light is green or the stop has been made, when nobody who holds a grant
@@ -9,11 +8,12 @@ who arrived first; a vehicle that waits its turn keeps later ones from overtakin
 
 from __future__ import annotations
 
-import numpy as np
-
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.world.state import PATH_LANES, ActorKind
+from di_envs.town.lanes import Lanes, Signals
+from di_envs.world.state import PATH_LANES, ActorKind, State
 from di_envs.world.traffic.approach import (
+    Requests,
     can_stop,
     find_approach,
     must_stop,
@@ -21,6 +21,8 @@ from di_envs.world.traffic.approach import (
     priority_of,
     yellow_left_s,
 )
+from di_envs.world.traffic.occupancy import Occupancy
+from di_envs.world.traffic.speed_choice import Leaders
 from di_envs.world.traffic.yielding import (
     crosses_holder,
     ego_in_the_way,
@@ -35,13 +37,22 @@ _ABSENT = int(ActorKind.ABSENT)
 
 
 @kernel
-def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end, ahead):
+def update_grants(
+    requests: Requests,
+    occupancy: Occupancy,
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    egos: int,
+    vehicle_end: int,
+    ahead: Leaders,
+) -> None:
     """One tick of right of way: arrivals, stops, grants taken back at yellow, grants given.
 
     Args:
-        ahead: The vehicles' leaders of this tick (`traffic.Leaders`).
+        ahead: The vehicles' leaders of this tick.
     """
-    tick = state.tick[()]
+    tick = int(state.tick[()])
     requests.full[:] = 0
     asking = 0
     for actor in range(egos, vehicle_end):
@@ -71,21 +82,21 @@ def update_grants(requests, occupancy, state, lanes, signals, egos, vehicle_end,
         waited = tick - state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else 0
         priority = priority_of(state, lanes, signals, approach, way, waited)
         arrival = state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else tick
-        requests.rank[actor] = (np.int64(priority) << 40) + np.int64(arrival)
+        requests.rank[actor] = (as_int64(priority) << 40) + as_int64(arrival)
         requests.queue[asking] = actor
         asking += 1
     give_grants(requests, occupancy, state, lanes, signals, egos, asking)
 
 
 @kernel
-def _waits_behind(state, ahead, actor, distance):
+def _waits_behind(state: State, ahead: Leaders, actor: int, distance: float) -> bool:
     """Whether somebody without a grant stands between a vehicle and its stop line."""
     leader = ahead.actor[actor]
     return leader >= 0 and ahead.gap_m[actor] < distance and state.grant[leader] < 0
 
 
 @kernel
-def _make_way_for_next(state, lanes, actor):
+def _make_way_for_next(state: State, lanes: Lanes, actor: int) -> None:
     """On its way through a junction that the next one follows closely, a vehicle asks for that too.
 
     It cannot wait until its rear has left the first: there is no room for it in between.
@@ -105,7 +116,7 @@ def _make_way_for_next(state, lanes, actor):
 
 
 @kernel
-def _release_grant(state, lanes, actor):
+def _release_grant(state: State, lanes: Lanes, actor: int) -> None:
     """A grant ends when the vehicle's rear has left the junction."""
     grant = state.grant[actor]
     if grant < 0:
@@ -126,7 +137,15 @@ def _release_grant(state, lanes, actor):
 
 
 @kernel
-def give_grants(requests, occupancy, state, lanes, signals, egos, asking):
+def give_grants(
+    requests: Requests,
+    occupancy: Occupancy,
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    egos: int,
+    asking: int,
+) -> None:
     """Serves those who ask (`requests.queue[:asking]` with ranks) in order of rank.
 
     Those who could not go for others' sake are moved to the front of the queue scratch: they keep
@@ -140,7 +159,7 @@ def give_grants(requests, occupancy, state, lanes, signals, egos, asking):
         if not exit_has_room(occupancy, state, lanes, actor, requests.way_step[actor]):
             requests.full[actor] = 1
             continue
-        after = requests.rank[actor] >= (np.int64(1) << 40)
+        after = requests.rank[actor] >= (as_int64(1) << 40)
         if (
             _blocked_by_queue(requests, lanes, way, waiting)
             or crosses_holder(occupancy, state, lanes, way, actor)
@@ -155,7 +174,7 @@ def give_grants(requests, occupancy, state, lanes, signals, egos, asking):
 
 
 @kernel
-def _blocked_by_queue(requests, lanes, way, waiting):
+def _blocked_by_queue(requests: Requests, lanes: Lanes, way: int, waiting: int) -> bool:
     """Whether somebody whose turn comes earlier waits for a way that meets this one."""
     blocked = False
     for i in range(waiting):
@@ -164,7 +183,8 @@ def _blocked_by_queue(requests, lanes, way, waiting):
 
 
 @kernel
-def _sort_queue(requests, asking):
+def _sort_queue(requests: Requests, asking: int) -> None:
+    """Sorts those who ask by rank, those of one rank as they stand."""
     for i in range(1, asking):
         actor = requests.queue[i]
         j = i - 1

@@ -30,7 +30,6 @@ class TrafficTables(NamedTuple):
     crossing_start: NDArray[np.int32]  # (L + 1,)
     crossing: NDArray[np.int32]  # crosswalk index
     crossing_begin_m: NDArray[np.float64]
-    crossing_end_m: NDArray[np.float64]
 
 
 def traffic_tables(town: Town) -> TrafficTables:
@@ -46,7 +45,6 @@ def traffic_tables(town: Town) -> TrafficTables:
         crossing_start=crossings[0],
         crossing=crossings[1],
         crossing_begin_m=crossings[2],
-        crossing_end_m=crossings[3],
     )
 
 
@@ -108,18 +106,17 @@ def _share_predecessor(town: Town, a: int, b: int) -> bool:
 
 def _crossings(
     town: Town,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    """Crosswalks on each lane, in order: (first row of each lane, crosswalk, its begin [m])."""
     walks = town.crosswalks
-    rows: list[list[tuple[float, float, int]]] = [[] for _ in range(town.lanes.kind.size)]
+    rows: list[list[tuple[float, int]]] = [[] for _ in range(town.lanes.kind.size)]
     for crosswalk in range(walks.width_m.size):
         for k in range(walks.crossed_start[crosswalk], walks.crossed_start[crosswalk + 1]):
-            begin, end = float(walks.crossed_begin_m[k]), float(walks.crossed_end_m[k])
-            rows[walks.crossed_lane[k]].append((begin, end, crosswalk))
+            rows[walks.crossed_lane[k]].append((float(walks.crossed_begin_m[k]), crosswalk))
     flat = [entry for row in rows for entry in sorted(row)]
     start = np.cumsum([0] + [len(row) for row in rows])
     return (
         start.astype(np.int32),
-        np.array([entry[2] for entry in flat], np.int32),
-        np.array([entry[0] for entry in flat], np.float64),
-        np.array([entry[1] for entry in flat], np.float64),
+        np.array([crosswalk for _, crosswalk in flat], np.int32),
+        np.array([begin for begin, _ in flat], np.float64),
     )

@@ -1,13 +1,13 @@
-# mypy: disallow_untyped_defs=False
 """Who is in the way of a vehicle that would enter a junction: grants of others, egos, a jam."""
 
 from __future__ import annotations
 
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import LightState, SignalKind
+from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import project_to_lane
-from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S
+from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S, State
 from di_envs.world.traffic.approach import MOVING_MPS
+from di_envs.world.traffic.occupancy import Occupancy
 
 EGO_TURN_TICKS = round(6.0 / TICK_S)  # for which others let an ego that came first go first
 EXIT_MARGIN_M = 3.0
@@ -17,7 +17,7 @@ _LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
-def _rear_on(state, lanes, actor, lane):
+def _rear_on(state: State, lanes: Lanes, actor: int, lane: int) -> float:
     """Station of a vehicle's rear on a junction lane of its path: negative before it."""
     s = state.lane_m[actor] - state.half_length[actor]
     if state.lane[actor] == lane:
@@ -28,7 +28,7 @@ def _rear_on(state, lanes, actor, lane):
 
 
 @kernel
-def crosses_holder(occupancy, state, lanes, way, actor):
+def crosses_holder(occupancy: Occupancy, state: State, lanes: Lanes, way: int, actor: int) -> bool:
     """Whether a vehicle with a grant is still before or in a place where `way` meets its own."""
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
         other = lanes.conflict_lane[k]
@@ -48,7 +48,9 @@ def crosses_holder(occupancy, state, lanes, way, actor):
 
 
 @kernel
-def _crosses_leaver(occupancy, state, lanes, other, end_m, actor):
+def _crosses_leaver(
+    occupancy: Occupancy, state: State, lanes: Lanes, other: int, end_m: float, actor: int
+) -> bool:
     """Whether the tail of a vehicle that goes on to a near junction is still before station end."""
     leaver = occupancy.leaver[other]
     while leaver >= 0:
@@ -60,7 +62,7 @@ def _crosses_leaver(occupancy, state, lanes, other, end_m, actor):
 
 
 @kernel
-def _same_approach(lanes, a, b):
+def _same_approach(lanes: Lanes, a: int, b: int) -> bool:
     """Whether two junction lanes begin at the same approach lane: followers see each other."""
     for i in range(lanes.predecessor_start[a], lanes.predecessor_start[a + 1]):
         for j in range(lanes.predecessor_start[b], lanes.predecessor_start[b + 1]):
@@ -70,7 +72,7 @@ def _same_approach(lanes, a, b):
 
 
 @kernel
-def ways_conflict(lanes, way, other):
+def ways_conflict(lanes: Lanes, way: int, other: int) -> bool:
     """Whether two junction lanes meet (or are the same)."""
     if way == other:
         return True
@@ -81,7 +83,15 @@ def ways_conflict(lanes, way, other):
 
 
 @kernel
-def ego_in_the_way(state, lanes, signals, egos, way, actor, ranks_after_priority):
+def ego_in_the_way(
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    egos: int,
+    way: int,
+    actor: int,
+    ranks_after_priority: bool,
+) -> bool:
     """Whether an ego lies before or in a place where `way` meets the lanes it may be driving."""
     for ego in range(egos):
         for k in range(OCCUPIED_LANES):
@@ -99,7 +109,8 @@ def ego_in_the_way(state, lanes, signals, egos, way, actor, ranks_after_priority
 
 
 @kernel
-def _ego_meets(state, lanes, way, lane, ego):
+def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int) -> bool:
+    """Whether an ego on a junction lane is before or in a place where `way` meets it."""
     if lane == way:
         return False  # it is ahead on the same way: a leader, not a crossing
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
@@ -111,7 +122,16 @@ def _ego_meets(state, lanes, way, lane, ego):
 
 
 @kernel
-def _ego_comes_first(state, lanes, signals, way, approach, ego, actor, ranks_after_priority):
+def _ego_comes_first(
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    way: int,
+    approach: int,
+    ego: int,
+    actor: int,
+    ranks_after_priority: bool,
+) -> bool:
     """Whether an ego at the end of an approach lane has its turn before the vehicle."""
     s, _ = project_to_lane(lanes, approach, state.x[ego], state.y[ego])
     front = lanes.length_m[approach] - s - state.half_length[ego]
@@ -137,7 +157,9 @@ def _ego_comes_first(state, lanes, signals, way, approach, ego, actor, ranks_aft
 
 
 @kernel
-def exit_has_room(occupancy, state, lanes, actor, way_step):
+def exit_has_room(
+    occupancy: Occupancy, state: State, lanes: Lanes, actor: int, way_step: int
+) -> bool:
     """Whether the vehicle would fit behind the last body beyond the junction."""
     need = 2.0 * state.half_length[actor] + EXIT_MARGIN_M
     beyond = way_step

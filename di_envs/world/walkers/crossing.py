@@ -1,16 +1,17 @@
-# mypy: disallow_untyped_defs=False
 """When a walker may step onto a crosswalk, and what stops one who is on it."""
 
 from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.geometry import boxes_overlap
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import LightState
+from di_envs.town.lanes import LightState, Signals
 from di_envs.world.bodies import SAME_LEVEL_M
 from di_envs.world.lights import TURN_TICKS
-from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.state import TICK_S, ActorKind, State
+from di_envs.world.walkers.walk_graph import WalkGraph
 
 COMFORTABLE_MPS2 = 2.5  # braking that walkers expect of drivers …
 REACTION_S = 0.7  # … after this time …
@@ -25,12 +26,13 @@ FIRST_VEHICLE, LAST_VEHICLE = int(ActorKind.CAR), int(ActorKind.BICYCLE)
 
 
 @kernel
-def is_vehicle(kind):
+def is_vehicle(kind: int) -> bool:
+    """Whether an actor of this kind is one that people look out for."""
     return FIRST_VEHICLE <= kind <= LAST_VEHICLE
 
 
 @kernel
-def ticks_to_green(signals, signal, phase_group, phase_ticks):
+def ticks_to_green(signals: Signals, signal: int, phase_group: int, phase_ticks: int) -> int:
     """Ticks until a light that is red turns green; phases are those of its junction."""
     groups = signals.groups[signals.junction[signal]]
     turns = (signals.group[signal] - phase_group) % groups
@@ -40,7 +42,9 @@ def ticks_to_green(signals, signal, phase_group, phase_ticks):
 
 
 @kernel
-def _lights_hold(state, walk, signals, crosswalk, needed_ticks):
+def _lights_hold(
+    state: State, walk: WalkGraph, signals: Signals, crosswalk: int, needed_ticks: int
+) -> bool:
     """Whether every light of the crossed arm is red, and stays so for long enough.
 
     Nobody knows how long a light that is forced stays as it is.
@@ -59,7 +63,8 @@ def _lights_hold(state, walk, signals, crosswalk, needed_ticks):
 
 
 @kernel
-def _is_on_strip(state, strip, actor):
+def _is_on_strip(state: State, strip: Float64, actor: int) -> bool:
+    """Whether an actor's box reaches onto a strip (6,): x, y, z, yaw, half length and width."""
     if abs(state.z[actor] - strip[2]) >= SAME_LEVEL_M:
         return False
     return boxes_overlap(
@@ -77,7 +82,7 @@ def _is_on_strip(state, strip, actor):
 
 
 @kernel
-def could_stop(speed_mps, gap_m):
+def could_stop(speed_mps: float, gap_m: float) -> bool:
     """Whether a vehicle could stop comfortably before a strip, or stands before it."""
     needed = speed_mps * speed_mps / (2.0 * COMFORTABLE_MPS2) + REACTION_S * speed_mps
     if speed_mps >= STANDS_MPS:
@@ -86,7 +91,7 @@ def could_stop(speed_mps, gap_m):
 
 
 @kernel
-def _goes_over(state, actor, lane):
+def _goes_over(state: State, actor: int, lane: int) -> bool:
     """Whether a vehicle's chosen path has this lane; an ego's is unknown, so it might."""
     found = actor < state.throttle.size
     for k in range(state.path.shape[1]):
@@ -95,7 +100,7 @@ def _goes_over(state, actor, lane):
 
 
 @kernel
-def _leaves_room(state, walk, crosswalk, actor):
+def _leaves_room(state: State, walk: WalkGraph, crosswalk: int, actor: int) -> bool:
     """Whether a vehicle is off the strip, and not heading for it or able to stop comfortably."""
     if _is_on_strip(state, walk.strip[crosswalk], actor):
         return False
@@ -115,7 +120,14 @@ def _leaves_room(state, walk, crosswalk, actor):
 
 
 @kernel
-def may_cross(state, walk, signals, crosswalk, needed_ticks, vehicle_end):
+def may_cross(
+    state: State,
+    walk: WalkGraph,
+    signals: Signals,
+    crosswalk: int,
+    needed_ticks: int,
+    vehicle_end: int,
+) -> bool:
     """Whether a walker who needs so many ticks may step onto a crosswalk now.
 
     Egos and vehicles, which are looked out for, are the actors before `vehicle_end`.
@@ -129,7 +141,17 @@ def may_cross(state, walk, signals, crosswalk, needed_ticks, vehicle_end):
 
 
 @kernel
-def is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m, look_s):
+def is_in_the_way(
+    state: State,
+    actor: int,
+    x: float,
+    y: float,
+    z: float,
+    heading: float,
+    step_m: float,
+    margin_m: float,
+    look_s: float,
+) -> bool:
     """Whether a step from (x, y) would go into a vehicle, or where it will be within `look_s`.
 
     Steps away from its middle are always free, so that nobody is held by a body beside them.
@@ -151,7 +173,16 @@ def is_in_the_way(state, actor, x, y, z, heading, step_m, margin_m, look_s):
 
 
 @kernel
-def is_blocked(state, actors, x, y, z, heading, step_m, margin_m):
+def is_blocked(
+    state: State,
+    actors: int,
+    x: float,
+    y: float,
+    z: float,
+    heading: float,
+    step_m: float,
+    margin_m: float,
+) -> bool:
     """Whether one of the first `actors` stands in, or drives into, a walker's next step."""
     for actor in range(actors):
         if is_vehicle(state.kind[actor]) and is_in_the_way(

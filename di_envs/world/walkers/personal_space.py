@@ -1,11 +1,10 @@
-# mypy: disallow_untyped_defs=False
 """Walkers keep out of each other's way: nobody steps into another."""
 
 from __future__ import annotations
 
 from di_envs.numerics.kernels import kernel
 from di_envs.world.bodies import SAME_LEVEL_M
-from di_envs.world.state import ActorKind
+from di_envs.world.state import ActorKind, State
 
 CLEAR_M = 0.75  # between two middles: more than the diagonal of a body's square, 0.71
 
@@ -13,7 +12,7 @@ WALKER = int(ActorKind.WALKER)
 
 
 @kernel
-def step_is_free(state, walker, first, end, x, y):
+def step_is_free(state: State, walker: int, first: int, end: int, x: float, y: float) -> bool:
     """Whether a walker may step to (x, y): it comes near nobody, or leads away from who is near.
 
     The walkers are the actors [first, end).

@@ -1,4 +1,3 @@
-# mypy: disallow_untyped_defs=False
 """Walkers stroll along sidewalks at their own pace, and cross where it is safe.
 
 Each follows the edges of the walking graph, to the right of their lines, and takes a keyed choice
@@ -9,12 +8,15 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.arrays import Int8
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, uniform
+from di_envs.town.lanes import Signals
 from di_envs.world.contact import DOWN
-from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.walkers.crossing import BODY_M, is_blocked, may_cross
 from di_envs.world.walkers.personal_space import step_is_free
+from di_envs.world.walkers.walk_graph import WalkGraph
 
 SLOWEST_MPS, FASTEST_MPS = 0.8, 1.8
 CROSSING_MPS = 1.3  # nobody dawdles on a crosswalk
@@ -37,7 +39,7 @@ ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
 
 @kernel
-def _sidewalk_at(walk, share):
+def _sidewalk_at(walk: WalkGraph, share: float) -> tuple[int, float]:
     """The edge and station at a share of all sidewalks' length; crosswalks are left out."""
     total = 0.0
     for edge in range(walk.first.size):
@@ -54,7 +56,10 @@ def _sidewalk_at(walk, share):
 
 
 @kernel
-def _is_free(state, walk, first, walker, edge, station):
+def _is_free(
+    state: State, walk: WalkGraph, first: int, walker: int, edge: int, station: float
+) -> bool:
+    """Whether no walker before this one stands near a station [m] of an edge."""
     x, y, _, _ = place_on_edge(walk, edge, station, 1)
     for other in range(first, walker):
         if state.kind[other] == WALKER:
@@ -65,7 +70,9 @@ def _is_free(state, walk, first, walker, edge, station):
 
 
 @kernel
-def place_on_edge(walk, edge, station, direction):
+def place_on_edge(
+    walk: WalkGraph, edge: int, station: float, direction: int
+) -> tuple[float, float, float, float]:
     """Where somebody walks who goes in `direction` at a station: (x, y, z, yaw)."""
     step = station / walk.spacing_m[edge]
     k = min(max(int(step), 0), walk.size[edge] - 2)
@@ -80,12 +87,12 @@ def place_on_edge(walk, edge, station, direction):
 
 
 @kernel
-def spawn_walkers(state, walk, first, count):
+def spawn_walkers(state: State, walk: WalkGraph, first: int, count: int) -> None:
     """Puts walkers [first, first + count) on sidewalks, all by keyed draws.
 
     Where there is no sidewalk, or none free after eight draws, the slot stays ABSENT.
     """
-    seed = state.seed[()]
+    seed = int(state.seed[()])
     for walker in range(first, first + count):
         state.kind[walker] = ABSENT
         for attempt in range(SPAWN_TRIES):
@@ -96,8 +103,9 @@ def spawn_walkers(state, walk, first, count):
 
 
 @kernel
-def _stand_up(state, walk, walker, edge, station):
-    seed = state.seed[()]
+def _stand_up(state: State, walk: WalkGraph, walker: int, edge: int, station: float) -> None:
+    """Fills the slot of a walker who stands at a station [m] of an edge."""
+    seed = int(state.seed[()])
     state.kind[walker] = WALKER
     state.half_length[walker] = BODY_M
     state.half_width[walker] = BODY_M
@@ -118,13 +126,13 @@ def _stand_up(state, walk, walker, edge, station):
 
 
 @kernel
-def _travelled(walk, edge, direction, station):
+def _travelled(walk: WalkGraph, edge: int, direction: int, station: float) -> float:
     """A station seen in the direction of walking: metres from where the edge was entered."""
     return station if direction > 0 else walk.length_m[edge] - station
 
 
 @kernel
-def _road_part(walk, edge, direction):
+def _road_part(walk: WalkGraph, edge: int, direction: int) -> tuple[float, float, float]:
     """Kerb and edges of the driving part in the direction of walking: (kerb, begin, end) [m]."""
     begin, end = walk.road_begin_m[edge], walk.road_end_m[edge]
     if direction < 0:
@@ -133,7 +141,7 @@ def _road_part(walk, edge, direction):
 
 
 @kernel
-def _behind_others(state, walker, first, end, pace):
+def _behind_others(state: State, walker: int, first: int, end: int, pace: float) -> float:
     """The pace, slowed to that of somebody close ahead on the same edge, going the same way."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     at, edges = state.walk_m[walker], state.walk_edge
@@ -149,7 +157,9 @@ def _behind_others(state, walker, first, end, pace):
 
 
 @kernel
-def _must_wait(state, walk, signals, walker, first, pace):
+def _must_wait(
+    state: State, walk: WalkGraph, signals: Signals, walker: int, first: int, pace: float
+) -> bool:
     """Whether the walker has come to the kerb and may not cross yet."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     kerb, _begin, end = _road_part(walk, edge, direction)
@@ -163,14 +173,15 @@ def _must_wait(state, walk, signals, walker, first, pace):
 
 
 @kernel
-def _turn_back(state, walker):
+def _turn_back(state: State, walker: int) -> None:
+    """Lets a walker go the other way, with new patience."""
     state.walk_direction[walker] = -state.walk_direction[walker]
     state.walk_waiting[walker] = 0
     state.still_ticks[walker] = 0
 
 
 @kernel
-def _go_on(state, walk, walker):
+def _go_on(state: State, walk: WalkGraph, walker: int) -> None:
     """At an edge's end: a keyed choice of the next, or back where there is none."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     end = 2 * edge + (1 if direction > 0 else 0)
@@ -180,7 +191,7 @@ def _go_on(state, walk, walker):
         state.walk_m[walker] = walk.length_m[edge] if direction > 0 else 0.0
         _turn_back(state, walker)
         return
-    draw = uniform(state.seed[()], TURN_STREAM, state.tick[()], walker)
+    draw = uniform(int(state.seed[()]), TURN_STREAM, int(state.tick[()]), walker)
     link = begin + int(draw * choices)
     state.walk_edge[walker] = walk.next_edge[link]
     state.walk_direction[walker] = walk.next_direction[link]
@@ -189,7 +200,9 @@ def _go_on(state, walk, walker):
 
 
 @kernel
-def _step_towards(state, walk, walker, reach_m, first, end):
+def _step_towards(
+    state: State, walk: WalkGraph, walker: int, reach_m: float, first: int, end: int
+) -> bool:
     """Moves the body towards its place, at most `reach_m`: corners are cut, not leapt.
 
     Returns:
@@ -214,7 +227,8 @@ def _step_towards(state, walk, walker, reach_m, first, end):
 
 
 @kernel
-def _lie(state, walker):
+def _lie(state: State, walker: int) -> None:
+    """One tick of a walker who was knocked down; after a while he is taken away."""
     state.speed[walker] = 0.0
     state.still_ticks[walker] += 1
     if state.still_ticks[walker] > LIE_TICKS:
@@ -222,7 +236,8 @@ def _lie(state, walker):
 
 
 @kernel
-def _stand(state, walker, waiting):
+def _stand(state: State, walker: int, waiting: int) -> None:
+    """One tick of a walker who stands; `waiting` is 1 at a kerb, where he gives up some time."""
     state.speed[walker] = 0.0
     state.acceleration[walker] = 0.0
     state.walk_waiting[walker] = waiting
@@ -232,7 +247,7 @@ def _stand(state, walker, waiting):
 
 
 @kernel
-def _is_held(state, walker, pace, bodies):
+def _is_held(state: State, walker: int, pace: float, bodies: int) -> bool:
     """Whether a vehicle among the first `bodies` actors is in the way of the next step."""
     margin = MARGIN_M if state.still_ticks[walker] < SQUEEZE_TICKS else 0.0
     return is_blocked(
@@ -248,7 +263,10 @@ def _is_held(state, walker, pace, bodies):
 
 
 @kernel
-def _walk_on(state, walk, signals, walker, first, end):
+def _walk_on(
+    state: State, walk: WalkGraph, signals: Signals, walker: int, first: int, end: int
+) -> None:
+    """One tick of a walker on his feet; arguments as of `move_walkers`."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     crossing = walk.crosswalk[edge] >= 0
     pace = state.desired_factor[walker]
@@ -274,13 +292,13 @@ def _walk_on(state, walk, signals, walker, first, end):
     state.walk_edge[walker], state.walk_m[walker] = edge, station
     state.walk_direction[walker] = direction
     _stand(state, walker, 0)
-    share = uniform(state.seed[()], PACE_STREAM, 1, walker)
+    share = uniform(int(state.seed[()]), PACE_STREAM, 1, walker)
     if state.still_ticks[walker] > (1.0 + share) * PATIENCE_TICKS:
         _turn_back(state, walker)
 
 
 @kernel
-def move_walkers(state, walk, signals, first, end):
+def move_walkers(state: State, walk: WalkGraph, signals: Signals, first: int, end: int) -> None:
     """Advances the walkers, the actors [first, end), by a tick; lights and vehicles are read as is.
 
     Actors before `first` are the egos and vehicles that walkers look out for.
@@ -295,7 +313,7 @@ def move_walkers(state, walk, signals, first, end):
 
 
 @kernel
-def mark_busy_crosswalks(state, walk, busy):
+def mark_busy_crosswalks(state: State, walk: WalkGraph, busy: Int8) -> None:
     """Sets busy (X,) int8 to 1 where a walker is on the driving part of a crosswalk, else 0.
 
     From the step off the kerb to the far edge; walkers who wait do not count, who lie there do.

@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from di_envs.rules import Rules, rules_named
+from di_envs.rules.rule_set import Layout
 from di_envs.world.kinds import EventKind
 from leaderboard.records.carla.results_2 import carla_results_2
 from leaderboard.records.carla.words import (
@@ -20,7 +22,6 @@ from leaderboard.records.carla.words import (
     sensors_of,
 )
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.scoring.rules import Layout, Rules, rules_named
 from leaderboard.scoring.score import infractions_per_km, mean_score
 
 

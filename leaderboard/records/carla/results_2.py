@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from di_envs.rules.rule_set import PERFECT, Rules
 from di_envs.world.kinds import EventKind
 from leaderboard.records.carla.words import (
     KEYS,
@@ -23,7 +24,6 @@ from leaderboard.records.carla.words import (
     sensors_of,
 )
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.scoring.rules import PERFECT, Rules
 
 _DECIMALS, _SCORE_DECIMALS = 3, 6
 _LEAST_KM = 0.001

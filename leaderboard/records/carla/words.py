@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from di_envs.rules import Rules
 from di_envs.world.kinds import EventKind
 from leaderboard.records.record import SIMULATION_CRASHED, EventRecord, RouteRecord, RunRecord
-from leaderboard.scoring.rules import Rules
 from leaderboard.scoring.score import share_of_distance
 
 # (event, key of its list, label of its rate)

@@ -19,7 +19,7 @@ class StudyDisplay(RunDisplay):
     def __init__(self, console: Console) -> None:
         super().__init__(console)
         self._open = 0
-        self._study: TaskID = self._progress.add_task("", what="the study", visible=False)
+        self._study: TaskID = self._bars.add_task("", what="the study", visible=False)
 
     def __enter__(self) -> Self:
         self._open += 1
@@ -37,17 +37,17 @@ class StudyDisplay(RunDisplay):
 
     def plan_study(self, total: int, done: int) -> None:
         """So many drives there are in all rows together, and so many are done."""
-        self._progress.update(self._study, total=total, completed=done, visible=total > done)
+        self._bars.update(self._study, total=total, completed=done, visible=total > done)
 
     def row(self, name: str) -> None:
         """This row is driven now."""
-        self._progress.reset(self._driving, visible=False)
-        self._progress.update(self._study, description=escape(name))
+        self._bars.reset(self._driving, visible=False)
+        self._bars.update(self._study, description=escape(name))
 
     def plan(self, total: int, done: int) -> None:
         """Of the row under way; what was driven before is counted in the study's bar."""
-        self._progress.update(self._driving, total=total, completed=done, visible=True)
+        self._bars.update(self._driving, total=total, completed=done, visible=True)
 
     def finished(self, record: RouteRecord) -> None:
         super().finished(record)
-        self._progress.advance(self._study)
+        self._bars.advance(self._study)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from types import TracebackType
-from typing import Self
 
-from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.displays.work_bar import Display, work_bar
 
 _MEMORY = 0.98  # of the running mean of the waypoint loss
 
 
-class TrainingDisplay:
+class TrainingDisplay(Display):
     """Shows a training on stderr, within a `with`."""
 
     def __init__(self, *, done: int, steps: int, batch: int) -> None:
-        self._bar = work_bar("training", "steps")
-        self._task = self._bar.add_task("", total=steps, completed=done)
+        super().__init__(work_bar("training", "steps"))
+        self._task = self._bars.add_task("", total=steps, completed=done)
         self._batch, self._waypoints_m = batch, 0.0
         self._steps, self._busy_s, self._since_s = 0, 0.0, time.monotonic()
 
@@ -30,26 +28,14 @@ class TrainingDisplay:
         self._waypoints_m = memory * self._waypoints_m + (1.0 - memory) * terms["waypoints"]
         speed = self._steps * self._batch / self._busy_s if self._busy_s else 0.0
         text = f"waypoints {self._waypoints_m:.2f} m, {speed:.0f} samples/s"
-        self._bar.update(self._task, completed=step, description=text)
+        self._bars.update(self._task, completed=step, description=text)
 
     def route(self, number: int) -> None:
         """A check drives its next route."""
-        self._bar.update(self._task, description=f"checking: drives route {number}")
+        self._bars.update(self._task, description=f"checking: drives route {number}")
 
     def checked(self, driving_score: float) -> None:
         """A check is done."""
         self._since_s = time.monotonic()  # it does not count as training
-        step = self._bar.tasks[0].completed
-        self._bar.print(f"step {step:.0f}: driving score {driving_score:.1f}", highlight=False)
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._bar.stop()
+        step = self._bars.tasks[0].completed
+        self._bars.print(f"step {step:.0f}: driving score {driving_score:.1f}", highlight=False)

@@ -1,35 +1,22 @@
 """Where jobs run: processes of this machine here, a cluster in `ray_engine`. Same bits anywhere.
 
-An engine drives what it is given and tells what became of it. It decides nothing: what is tried
-again, kept or shown is for the runner, once for all engines.
+An engine drives what it is given and tells what became of it; who drives what is for `scheduler`,
+and what is tried again, kept or shown for `runner`, each once for all engines.
 """
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from typing import Protocol
 
-from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.messages import (
-    Compiling,
-    Died,
-    Driven,
-    EngineEvent,
-    Lost,
-    Pause,
-    Ready,
-    Refused,
-    Scene,
-    Started,
-)
+from leaderboard.running.jobs import Job, RunSpec
+from leaderboard.running.messages import Compiling, Driven, EngineEvent, Scene, WorkerMessage
 from leaderboard.running.wall_clock import Limits
+from leaderboard.running.workers.scheduler import PAUSE_S, Scheduler
 from leaderboard.running.workers.worker_process import WorkerProcess
-
-PAUSE_S = 0.25  # longest time without an event
 
 
 class Engine(Protocol):
@@ -65,96 +52,55 @@ class LocalEngine:
 
     def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
         """See `Engine.run`."""
-        pool = _Pool(self, spec, jobs)
-        with contextlib.closing(pool):
-            while not pool.done:
-                yield from pool.share_out()
-                yield from pool.listen()
+        yield from Scheduler(_Processes(spec, self.limits), self.workers, jobs).run()
 
 
-class _Pool:
-    """The processes of one run.
+class _Processes:
+    """Worker processes of one run; see `Crew`.
 
     The first sets the run up and compiles as it begins to drive; the others load their modules
     meanwhile, and begin once the machine code is there to be loaded too.
     """
 
-    def __init__(self, engine: LocalEngine, spec: RunSpec, jobs: deque[Job]) -> None:
-        self._engine, self._spec, self._jobs = engine, spec, jobs
-        self._scene: Scene | None = None
+    def __init__(self, spec: RunSpec, limits: Limits) -> None:
+        self._spec, self._limits = spec, limits
         self._compiled = False
-        self._workers = [WorkerProcess(spec, engine.limits)]
-        self._workers[0].begin(None)
-        self._begun = {self._workers[0]}
+        self._begun: set[WorkerProcess] = set()
+        self._waiting: dict[WorkerProcess, Scene | None] = {}
 
-    @property
-    def done(self) -> bool:
-        """Whether all is driven."""
-        idle = all(worker.job is None for worker in self._workers)
-        return self._scene is not None and idle and not self._jobs
+    def hire(self, scene: Scene | None) -> WorkerProcess:
+        """Starts a process."""
+        worker = WorkerProcess(self._spec, self._limits)
+        self._waiting[worker] = scene
+        self._let_begin()
+        return worker
 
-    def share_out(self) -> Generator[EngineEvent]:
-        """Hands jobs to workers that have none, and starts as many as there is work for."""
-        if self._scene is None:
-            return
-        busy = sum(worker.job is not None for worker in self._workers)
-        wanted = min(self._engine.workers, busy + len(self._jobs))
-        while len(self._workers) < wanted:
-            self._workers.append(WorkerProcess(self._spec, self._engine.limits))
-        for worker in self._workers:
-            if worker.job is None and self._jobs and self._may_begin(worker):
-                job = self._jobs.popleft()
-                worker.hand_over(job)
-                yield Started(job=job)
+    def _let_begin(self) -> None:
+        """Lets all begin if the machine code is compiled; else one, which compiles it."""
+        for worker, scene in list(self._waiting.items()):
+            if self._compiled or not self._begun:
+                worker.begin(scene.requires if scene else None)
+                self._begun.add(worker)
+                del self._waiting[worker]
 
-    def _may_begin(self, worker: WorkerProcess) -> bool:
-        """Begins with a worker that has not, if the machine code is compiled."""
-        if worker not in self._begun:
-            if not self._compiled and len(self._begun) > 0:
-                return False
-            assert self._scene is not None
-            worker.begin(self._scene.requires)
-            self._begun.add(worker)
-        return True
+    def hand_over(self, worker: WorkerProcess, job: Job) -> None:
+        """Sends it a job."""
+        worker.hand_over(job)
 
-    def listen(self) -> Generator[EngineEvent]:
-        """Tells what the workers tell, or that there was nothing for a while."""
-        ready = wait(
-            [worker.connection for worker in self._workers]
-            + [worker.sentinel for worker in self._workers],
-            timeout=PAUSE_S,
-        )
-        if not ready:
-            yield Pause()
-        for worker in list(self._workers):
-            for message in worker.receive():
-                match message:
-                    case Ready(scene=scene):
-                        if self._scene is None:
-                            self._scene = scene
-                            yield message
-                    case Refused(reason=reason):
-                        raise SetupError(reason)
-                    case Died():
-                        yield from self._bury(worker, message)
-                    case Driven():
-                        self._compiled = True
-                        worker.job = None
-                        yield message
-                    case _:
-                        self._compiled |= message == Compiling()
-                        yield message
+    def listen(self, workers: Sequence[WorkerProcess]) -> list[tuple[WorkerProcess, WorkerMessage]]:
+        """Reads what the processes have sent, and finds the dead and those that take too long."""
+        wait([end for w in workers for end in (w.connection, w.sentinel)], timeout=PAUSE_S)
+        told = [(worker, message) for worker in workers for message in worker.receive()]
+        done = any(isinstance(message, Driven) or message == Compiling() for _, message in told)
+        self._compiled = self._compiled or done
+        self._let_begin()
+        return told
 
-    def _bury(self, worker: WorkerProcess, death: Died) -> Generator[EngineEvent]:
-        self._workers.remove(worker)
+    def check(self, first: Scene, other: Scene) -> None:
+        """One machine gives the same bits."""
+
+    def dismiss(self, worker: WorkerProcess) -> None:
+        """Kills it."""
         self._begun.discard(worker)
+        self._waiting.pop(worker, None)
         worker.stop()
-        if self._scene is None:
-            raise SetupError(f"the run cannot be set up: {death.reason}")
-        if worker.job is not None:
-            yield Lost(job=worker.job, status=death.status, reason=death.reason)
-
-    def close(self) -> None:
-        """Ends all processes."""
-        for worker in self._workers:
-            worker.stop()

@@ -1,7 +1,8 @@
 """Collects drives on a Ray cluster: driven wherever there is room, written here.
 
 The machines need no folder in common: a drive comes back as the bytes of its file. These are the
-same on equal footing only, so a machine whose CPU or versions are not those of this one is refused.
+same on equal footing only, so a machine whose CPU, versions or driver are not those of this one is
+refused.
 """
 
 from __future__ import annotations
@@ -14,46 +15,40 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.training.collect import DriveJob, Outcome, Pending, Pool
-from agents.training.frames import write_whole
-from di_envs.numerics.kernels import cpu_capability
-from leaderboard.records.versions import package_versions
+from agents.processes import Pending, Pool
+from agents.training.collect import DriveJob, Outcome
+from agents.versions import agent_version
+from di_envs.differences import differences
+from di_envs.files.whole import write_whole
+from leaderboard.records.footing import footing_here
 from leaderboard.running.jobs import SetupError
 from leaderboard.running.workers.ray_engine import cluster
 
 
-@dataclass(frozen=True, kw_only=True)
-class Footing:
-    """What the bits of a drive depend on beside its town and number."""
-
-    cpu: str
-    versions: Mapping[str, str]
-
-    @classmethod
-    def here(cls) -> Footing:
-        """This machine's."""
-        return cls(cpu=cpu_capability(), versions=package_versions())
+def footing_of_driver(driver: str) -> Mapping[str, str]:
+    """What the bits of a drive depend on beside its town and number, on this machine."""
+    return {**footing_here(driver), "the driver": agent_version(driver)}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Driven:
+class Delivery:
     """What comes back from the cluster: what became of a drive, its file, and where it ran."""
 
     outcome: Outcome
     content: bytes
-    footing: Footing
+    footing: Mapping[str, str]
 
 
-def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Driven:
+def drive_elsewhere(drive: Callable[[DriveJob], Outcome], job: DriveJob) -> Delivery:
     """Drives on whatever machine this runs on, and leaves nothing there."""
     with tempfile.TemporaryDirectory(prefix="driveinsight-") as folder:
         there = dataclasses.replace(job, folder=Path(folder))
         outcome = drive(there)
         path = there.dropped_path if outcome.why else there.path
-        return Driven(
+        return Delivery(
             outcome=dataclasses.replace(outcome, job=job),
             content=path.read_bytes(),
-            footing=Footing.here(),
+            footing=footing_of_driver(job.driver),
         )
 
 
@@ -71,13 +66,13 @@ class RayPending:
             SetupError: If it was driven on a machine that gives other bits, or not at all.
         """
         try:
-            driven: Driven = self.ray.get(self.reference)
+            driven: Delivery = self.ray.get(self.reference)
         except self.ray.exceptions.RayError as error:
             raise SetupError(f"the cluster did not drive it: {error}") from error
-        check_footing(driven.footing)
         job = driven.outcome.job
+        check_footing(driven.footing, footing_of_driver(job.driver))
         path = job.dropped_path if driven.outcome.why else job.path
-        write_whole(path, lambda file: file.write(driven.content))
+        write_whole(path, driven.content)
         return driven.outcome
 
     def cancel(self) -> bool:
@@ -103,20 +98,20 @@ class Found:
 
 @dataclass(frozen=True, kw_only=True)
 class RayPool:
-    """A cluster that drives; see `agents.training.collect.Pool`."""
+    """A cluster that drives; see `agents.processes.Pool`."""
 
     ray: Any
 
-    def submit(self, drive: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending:
+    def submit(self, work: Callable[[DriveJob], Outcome], job: DriveJob, /) -> Pending[Outcome]:
         """Has a job driven, unless its file is here."""
         if job.done:
-            return Found(outcome=drive(job))
+            return Found(outcome=work(job))
         elsewhere = self.ray.remote(num_cpus=1)(drive_elsewhere)
-        return RayPending(ray=self.ray, reference=elsewhere.remote(drive, job))
+        return RayPending(ray=self.ray, reference=elsewhere.remote(work, job))
 
 
 @contextlib.contextmanager
-def ray_pool(workers: int, address: str | None) -> Generator[Pool]:
+def ray_pool(workers: int, address: str | None) -> Generator[Pool[DriveJob, Outcome]]:
     """A cluster for as long as this lasts.
 
     Args:
@@ -130,24 +125,15 @@ def ray_pool(workers: int, address: str | None) -> Generator[Pool]:
         yield RayPool(ray=ray)
 
 
-def check_footing(footing: Footing) -> None:
+def check_footing(there: Mapping[str, str], here: Mapping[str, str]) -> None:
     """Refuses a machine that would give other bits than this one.
 
     Raises:
-        SetupError: If its CPU or its versions are others.
+        SetupError: If its CPU, its versions or its driver are others.
     """
-    ours = Footing.here()
-    if footing.cpu != ours.cpu:
+    if found := differences(there, here):
+        said = "; ".join(difference.is_not for difference in found)
         raise SetupError(
-            f"a machine of the cluster has another CPU ({footing.cpu}, here {ours.cpu}), so its "
-            f"drives would have other bits: collect with machines that are alike"
-        )
-    other = [
-        f"{name} {footing.versions.get(name, 'missing')} (here {version})"
-        for name, version in ours.versions.items()
-        if footing.versions.get(name) != version
-    ]
-    if other:
-        raise SetupError(
-            f"a machine of the cluster has other versions: {', '.join(other)}: install the same"
+            f"a machine of the cluster differs from this one ({said}), so its drives would have "
+            "other bits: collect with machines that are alike, with the same packages and files"
         )

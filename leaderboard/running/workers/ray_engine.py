@@ -13,33 +13,30 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
 from agents.base import Requirements
+from leaderboard.records.footing import record_differences
 from leaderboard.records.record import WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.messages import (
     Died,
     Driven,
     EngineEvent,
-    Lost,
-    Pause,
     Ready,
     Refused,
     Scene,
-    Started,
     Warned,
     WorkerMessage,
 )
 from leaderboard.running.wall_clock import Limits
-from leaderboard.running.workers.local_engine import PAUSE_S
+from leaderboard.running.workers.scheduler import PAUSE_S, Scheduler
 from leaderboard.running.workers.worker_process import WorkerProcess
 
-_MOST_NEVER_READY = 5  # workers that die as they start: a cluster's fault that will not go away
 WITHOUT_RAY = "--engine ray needs Ray: pip install 'driveinsight[ray]'"
 
 
@@ -69,12 +66,10 @@ class RayWorker:
 
 @dataclass(kw_only=True, eq=False)
 class _Held:
-    """An actor as the driver holds it: what it was asked last, and its job."""
+    """An actor as the driver holds it, and what it was asked last; None once it has answered."""
 
     actor: Any
     asked: Any
-    job: Job | None = None
-    ready: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,60 +90,39 @@ class RayEngine:
             raise ValueError(f"an engine needs at least 1 worker, not {self.workers}")
 
     def run(self, spec: RunSpec, jobs: deque[Job]) -> Generator[EngineEvent]:
-        """See `engines.Engine.run`."""
+        """See `local_engine.Engine.run`."""
         with cluster(self.workers, self.address) as ray:
-            crew = _Crew(self, ray, _absolute(spec), jobs)
-            with contextlib.closing(crew):
-                while not crew.done:
-                    yield from crew.share_out()
-                    yield from crew.listen()
+            crew = _Actors(ray, _absolute(spec), self.limits)
+            yield from Scheduler(crew, self.workers, jobs).run()
 
 
-class _Crew:
-    """The actors of one run. The first finds out what there is to drive."""
+class _Actors:
+    """The actors of one run; see `Crew`."""
 
-    def __init__(self, engine: RayEngine, ray: Any, spec: RunSpec, jobs: deque[Job]) -> None:
-        self._engine, self._ray, self._spec, self._jobs = engine, ray, spec, jobs
-        self._scene: Scene | None = None
+    def __init__(self, ray: Any, spec: RunSpec, limits: Limits) -> None:
+        self._ray, self._spec, self._limits = ray, spec, limits
         self._actor_class = ray.remote(num_cpus=1, max_restarts=0)(RayWorker)
-        self._crew = [self._hire()]
-        self._never_ready = 0
 
-    def _hire(self) -> _Held:
-        requires = self._scene.requires if self._scene else None
-        actor = self._actor_class.remote(self._spec, self._engine.limits, requires)
+    def hire(self, scene: Scene | None) -> _Held:
+        """Starts an actor, wherever there is room."""
+        requires = scene.requires if scene else None
+        actor = self._actor_class.remote(self._spec, self._limits, requires)
         return _Held(actor=actor, asked=actor.set_up.remote())
 
-    @property
-    def done(self) -> bool:
-        """Whether all is driven."""
-        idle = all(held.job is None for held in self._crew)
-        return self._scene is not None and idle and not self._jobs
+    def hand_over(self, worker: _Held, job: Job) -> None:
+        """Asks the actor to drive a job."""
+        worker.asked = worker.actor.drive.remote(job)
 
-    def share_out(self) -> Generator[EngineEvent]:
-        """Hires as many actors as there is work for; gives jobs to those that are ready."""
-        if self._scene is None:
-            return
-        busy = sum(held.job is not None for held in self._crew)
-        while len(self._crew) < min(self._engine.workers, busy + len(self._jobs)):
-            self._crew.append(self._hire())
-        for held in self._crew:
-            if held.ready and held.job is None and self._jobs:
-                held.job = self._jobs.popleft()
-                held.asked = held.actor.drive.remote(held.job)
-                yield Started(job=held.job)
-
-    def listen(self) -> Generator[EngineEvent]:
-        """Tells what actors answered, or that there was nothing for a while."""
-        asked = {held.asked: held for held in self._crew if held.asked is not None}
+    def listen(self, workers: Sequence[_Held]) -> list[tuple[_Held, WorkerMessage]]:
+        """Takes an answer, if there is one."""
+        asked = {held.asked: held for held in workers if held.asked is not None}
         answered, _ = self._ray.wait(list(asked), num_returns=1, timeout=PAUSE_S)
-        if not answered:
-            yield Pause()
+        told = []
         for reference in answered:
             held = asked[reference]
             held.asked = None
-            for message in self._answer(reference):
-                yield from self._take(held, message)
+            told += [(held, message) for message in self._answer(reference)]
+        return told
 
     def _answer(self, reference: Any) -> list[WorkerMessage]:
         """What an actor told; of one whose process or machine is gone, that it is."""
@@ -158,38 +132,13 @@ class _Crew:
             return [Died(status=WORKER_DIED, reason=f"the Ray worker is gone: {_brief(error)}")]
         return told
 
-    def _take(self, held: _Held, message: WorkerMessage) -> Generator[EngineEvent]:
-        match message:
-            case Ready(scene=scene):
-                held.ready = True
-                if self._scene is None:
-                    self._scene = scene
-                    yield message
-                check_footing(self._scene, scene)
-            case Refused(reason=reason):
-                raise SetupError(reason)
-            case Died(status=status, reason=reason):
-                yield from self._dismiss(held, status, reason)
-            case Driven():
-                held.job = None
-                yield message
-            case Warned():
-                yield message
+    def check(self, first: Scene, other: Scene) -> None:
+        """Machines of a cluster may be unlike."""
+        check_footing(first, other)
 
-    def _dismiss(self, held: _Held, status: str, reason: str) -> Generator[EngineEvent]:
-        """Lets a dead actor go; another takes its place, unless too many never got ready."""
-        self._crew.remove(held)
-        self._ray.kill(held.actor)
-        self._never_ready += not held.ready
-        if self._scene is None or self._never_ready > _MOST_NEVER_READY:
-            raise SetupError(f"a Ray worker cannot be set up: {reason}")
-        if held.job is not None:
-            yield Lost(job=held.job, status=status, reason=reason)
-
-    def close(self) -> None:
-        """Ends all actors, and with them their workers."""
-        for held in self._crew:
-            self._ray.kill(held.actor)
+    def dismiss(self, worker: _Held) -> None:
+        """Kills the actor, and with it its worker."""
+        self._ray.kill(worker.actor)
 
 
 def check_footing(first: Scene, other: Scene) -> None:
@@ -198,24 +147,19 @@ def check_footing(first: Scene, other: Scene) -> None:
     Raises:
         SetupError: If its CPU, versions, map, routes or agent are not those of the first worker.
     """
-    for name in ("cpu", "versions", "town_hash", "routes_hash", "agent_hash"):
-        ours, theirs = getattr(first, name), getattr(other, name)
-        if ours != theirs:
-            raise SetupError(
-                f"machines of the cluster differ in {name} ({_text(ours)} and {_text(theirs)}), "
-                "so the same route would not give the same bits: use machines that are alike, "
-                "with the same packages and files"
-            )
+    fields = ("cpu", "versions", "town_hash", "routes_hash", "agent_version")
+    if found := record_differences(first, other, fields):
+        said = "; ".join(difference.is_not for difference in found)
+        raise SetupError(
+            f"machines of the cluster differ ({said}), so the same route would not give the same "
+            "bits: use machines that are alike, with the same packages and files"
+        )
 
 
 def _brief(error: Exception) -> str:
     """The line of Ray's report that says what happened: an exception's last, else the first."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if "Error: " in lines[-1] else lines[0]
-
-
-def _text(value: Any) -> str:
-    return ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else value
 
 
 def _absolute(spec: RunSpec) -> RunSpec:

@@ -1,21 +1,21 @@
 """What a worker process does: set the run up, then drive one job after another till told to end.
 
-It ignores Ctrl-C, tells its parent all that happens in `messages`, and ends when its parent does.
+It tells its parent all that happens in `messages`; Ctrl-C and the parent's end are as for every
+child, see `agents.processes`.
 """
 
 from __future__ import annotations
 
 import faulthandler
-import multiprocessing
-import os
 import signal
 import threading
 import warnings
 from collections.abc import Callable
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from agents.processes import live_for_parent
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.wall_clock import Doing, Stopwatch
 
@@ -32,12 +32,11 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
         spec: The run.
         where: File into which it writes where it is when it gets `WHERE_SIGNAL`.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     faulthandler.enable()  # a crash inside a library says on stderr which line led to it
     with open(where, "w", encoding="utf-8") as place:
         where.unlink()  # the parent has it open: nothing is left behind, whatever happens
         faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
-        _end_with_parent()
+        live_for_parent()
         watch = Stopwatch(cells)
         try:
             _work(connection, watch, spec)
@@ -89,17 +88,3 @@ def _teller(connection: Connection) -> Callable[[Any], None]:
             connection.send(message)
 
     return tell
-
-
-def _end_with_parent() -> None:
-    """A parent that is killed cannot stop its workers: they watch it, and end too."""
-    parent = multiprocessing.parent_process()
-    if parent is None:
-        return
-    sentinel = parent.sentinel
-
-    def watch_parent() -> None:
-        wait([sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch_parent, daemon=True).start()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import re
 import signal
@@ -13,6 +12,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from agents.base import Requirements
+from agents.processes import FRESH, ctrl_c_blocked
 from leaderboard.records.record import OUT_OF_TIME, WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.messages import Died, WorkerMessage
@@ -24,35 +24,25 @@ _FRAME = re.compile(r'File "(.+)", line (\d+) in (\S+)')
 
 
 class WorkerProcess:
-    """A fresh process that drives jobs of one run.
-
-    Attributes:
-        job: What it was handed and has not finished.
-    """
+    """A fresh process that drives jobs of one run."""
 
     def __init__(self, spec: RunSpec, limits: Limits) -> None:
-        """Starts it with Ctrl-C blocked from birth: it must not die of it while it loads."""
-        context = multiprocessing.get_context("spawn")
-        self.job: Job | None = None
+        """Starts it; it begins when it is told to."""
         self._limits = limits
         self._dead = False
-        cells = context.RawArray("d", CELLS)
+        cells = FRESH.RawArray("d", CELLS)
         self._watch = Stopwatch(cells)
         self._watch.mark(Doing.LOADING)
         self._where = tempfile.NamedTemporaryFile(  # noqa: SIM115 (closed by `stop`)
             "r", prefix="driveinsight-", delete=False
         )
         self.connection: Connection
-        self.connection, theirs = context.Pipe()
-        self._process = context.Process(
+        self.connection, theirs = FRESH.Pipe()
+        self._process = FRESH.Process(
             target=serve, args=(theirs, cells, spec, Path(self._where.name))
         )
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
+        with ctrl_c_blocked(), contextlib.closing(theirs):
             self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            theirs.close()
 
     @property
     def sentinel(self) -> int:
@@ -65,7 +55,6 @@ class WorkerProcess:
 
     def hand_over(self, job: Job) -> None:
         """Gives it a job to drive."""
-        self.job = job
         self._send(job)
 
     def _send(self, value: object) -> None:

@@ -11,7 +11,7 @@ from hypothesis.strategies import floats
 
 from agents.carla.formats import bgra, gnss_at, imu_turned, input_data, lidar_points
 from agents.carla.plan import moved
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError, SensorType, suite_of
 from di_envs.sensors.inertial import EARTH_RADIUS_M, geodetic
 from di_envs.suites import load_suite

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 
 import pytest
 import torch
@@ -209,8 +210,21 @@ def test_a_policy_survives_the_way_to_disk_and_back(tmp_path, small):
         assert torch.equal(loaded(inputs).waypoints, small(inputs).waypoints)
 
 
+def _full(_: int) -> None:
+    raise OSError("the disk is full")
+
+
+def test_weights_that_cannot_be_written_leave_the_old_ones(tmp_path, small, monkeypatch):
+    save_pretrained(small, tmp_path, card="old")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr(os, "fsync", _full)
+    with pytest.raises(OSError, match="the disk is full"):
+        save_pretrained(new_policy("small-prompt-only"), tmp_path, card="new")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 def test_broken_or_foreign_weights_are_refused(tmp_path, small):
-    with pytest.raises(WeightsError, match=r"config\.json cannot be read"):
+    with pytest.raises(WeightsError, match=r"config\.json: cannot be read"):
         from_pretrained(tmp_path)
     save_pretrained(small, tmp_path, card="")
     weights = tmp_path / "weights.safetensors"
@@ -234,12 +248,35 @@ def test_a_configuration_survives_the_way_through_json(name):
     assert PolicyConfig.from_mapping(config.to_mapping()) == config
 
 
+@pytest.mark.parametrize(
+    ("find", "put", "says"),
+    [
+        ('"cells": 48', '"cells": "48"', r"config\.json: grid\.cells: expected a whole number"),
+        ('"cells": 48', '"cells": 47', r"config\.json: grid: .* multiple of 8 cells"),
+        ('"cells": 48', '"cell": 48', r"config\.json: grid: unknown field 'cell'"),
+        ('"cells": 48', '"cells": NaN', r"config\.json: is not whole JSON: NaN"),
+        ('"name": "small",', "", r"config\.json: name: is missing"),
+        ('{\n "format_version"', "[" * 100_000 + '{\n "format_version"', "nested deeper than 64"),
+        ('{\n "format_version"', '["format_version"]\n#', "is not whole JSON"),
+    ],
+    ids=["type", "value", "name", "NaN", "missing", "deep", "list"],
+)
+def test_a_wrong_configuration_file_says_where_it_is_wrong(tmp_path, small, find, put, says):
+    save_pretrained(small, tmp_path, card="")
+    path = tmp_path / "config.json"
+    assert find in path.read_text()
+    path.write_text(path.read_text().replace(find, put))
+    with pytest.raises(WeightsError, match=says) as caught:
+        from_pretrained(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
 def test_wrong_configurations_are_refused_with_the_next_step():
     with pytest.raises(
         ValueError, match=r"Unknown policy configuration 'smal'; did you mean 'smal"
     ):
         config_named("smal")
-    with pytest.raises(ValueError, match=r"Unknown field of PolicyConfig 'memory_frame'; did you"):
+    with pytest.raises(ValueError, match=r"field 'memory_frame'; did you mean 'memory_frames'"):
         PolicyConfig.from_mapping({"name": "mine", "memory_frame": 2})
     with pytest.raises(ValueError, match="needs a camera, a LiDAR or a prompt component"):
         PolicyConfig(name="blind", camera=None, lidar=None, prompt=())

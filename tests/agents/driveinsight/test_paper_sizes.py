@@ -32,7 +32,6 @@ def assert_a_pass_each_way(config):
     return output
 
 
-@pytest.mark.slow
 def test_the_papers_sizes_pass_both_ways():
     free_bytes = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if free_bytes < MEMORY_BYTES:

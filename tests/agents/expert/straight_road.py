@@ -6,13 +6,16 @@ actor 0, drives on it by the real decision kernel and the real longitudinal mode
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertConfig
 from agents.expert.decision import decide, start_progress
-from agents.expert.line import Progress
-from agents.expert.path import STEP_M, DrivePath
-from agents.expert.scene import Actors, Lights, Ways
+from agents.expert.path import DrivePath
+from agents.expert.progress import Progress
+from agents.expert.surroundings import Actors, Lights, Ways
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import EgoModel, longitudinal_acceleration
 from di_envs.world.state import PATH_LANES, ActorKind
@@ -119,6 +122,18 @@ def make_lights(state: LightState = LightState.GREEN, ticks: int = 0) -> Lights:
     return Lights(np.array([state], np.int8), np.zeros(1, np.int32), np.array([ticks], np.int32))
 
 
+def read_only(array: np.ndarray) -> np.ndarray:
+    """The same array as the world hands it out, so that it is the same machine code that runs."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def frozen(arrays: Any) -> Any:
+    """The same named tuple of arrays that cannot be written."""
+    return type(arrays)(*map(read_only, arrays))
+
+
 class Drive:
     """The ego on the path, a decision of 0.1 s at a time."""
 
@@ -158,11 +173,11 @@ class Drive:
     def step(self, dt_s: float = 0.1) -> None:
         """Decides and moves everybody straight on; the ego keeps to its path by itself."""
         throttle, steer, brake, self.progress = decide(
-            self.path,
+            frozen(self.path),
             self.progress,
-            self.actors,
-            self.ways,
-            self.lights,
+            frozen(self.actors),
+            frozen(self.ways),
+            frozen(self.lights),
             0,
             self.numbers,
             self.model,

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from agents import load_agent
 from di_envs import RouteEnv
+from di_envs.rules import RULES
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.state import ActorKind, EventKind
 from leaderboard.records.record import RouteRecord
 from leaderboard.records.rescoring import rescored_route
 from leaderboard.running.episode import drive_route
 from leaderboard.running.jobs import Job
-from leaderboard.scoring.rules import RULES
 
 TICK_S = 0.05
 STANDING_MPS = 0.1

@@ -11,7 +11,7 @@ import di_envs
 from agents.base import Agent
 from agents.constant import ConstantAgent
 from agents.expert.agent import Expert, ExpertMemory
-from agents.expert.line import localise
+from agents.expert.progress import localise
 from agents.highway import HighwayAgent
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import di_envs
+from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertConfig
 from agents.expert.decision import start_progress
-from agents.expert.line import pose_at, project
-from agents.expert.path import STEP_M, DrivePath, build_path, legs_of
+from agents.expert.legs import legs_of
+from agents.expert.path import DrivePath, build_path
+from agents.expert.progress import pose_at, project
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.routing.road_graph import build_road_graph

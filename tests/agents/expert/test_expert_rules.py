@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.expert.actors import PULL_OUT_M
-from agents.expert.line import Progress, shift_at
 from agents.expert.path import CHANGE_ROOM_M
+from agents.expert.progress import Progress, shift_at
 from agents.expert.speed import NO_LIMIT_MPS2, follow, forecast, stop_within, time_to
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import longitudinal_acceleration, pedals

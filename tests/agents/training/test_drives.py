@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from agents import load_agent
+from agents.training import collect as module
 from agents.training.collect import (
     DriveJob,
     Outcome,
@@ -18,14 +19,22 @@ from agents.training.collect import (
     drive_paths,
     without_standing_tail,
 )
-from agents.training.frames import DriveFileError, DriveLog, DriveStage, read_drive, write_drive
+from agents.training.frames import (
+    DriveFileError,
+    DriveLog,
+    DriveStage,
+    read_drive,
+    read_dropped,
+    write_drive,
+    write_dropped,
+)
 from agents.training.towns import town_files
 from agents.training.waypoints import expert_waypoints
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.route_env import RouteEnv
 
 SAME = "agents.expert.agent:Expert"  # under another name: a learner that needs no correction
-IDLE = "learners:Idle"
+IDLE = "tests.agents.training.learners:Idle"
 GROUPS = ("camera", "lidar", "prompt", "odometry")
 
 
@@ -180,9 +189,17 @@ def test_collecting_gives_the_same_files_stopped_or_not_with_one_process_or_two(
     assert sum(card["by_command"].values()) == card["moments"]
 
 
-def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monkeypatch):
-    from agents.training import collect as module
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"why": 3}', "[" * 100_000], ids=len)
+def test_a_garbled_reason_for_a_dropped_drive_says_what_to_do(tmp_path, text):
+    path = tmp_path / "a.dropped.json"
+    write_dropped(path, "red light")
+    assert read_dropped(path) == "red light"
+    path.write_text(text)
+    with pytest.raises(DriveFileError, match=r"a\.dropped\.json does not say why .*run collect"):
+        read_dropped(path)
 
+
+def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monkeypatch):
     # the expert that heeds no light, in its place
     monkeypatch.setattr(module, "_driver", lambda name: load_agent("expert-redrunner"))
     outcomes = [
@@ -193,8 +210,46 @@ def test_a_drive_with_an_infraction_is_dropped_and_stays_dropped(tmp_path, monke
     assert dropped
     job = dropped[0].job
     assert not job.path.exists()
-    assert json.loads(job.dropped_path.read_text()) == {"why": dropped[0].why}
+    assert json.loads(job.dropped_path.read_text())["why"] == dropped[0].why
     assert drive_job(job) == Outcome(job=job, moments=0, why=dropped[0].why)
+
+
+def other_weights(folder, monkeypatch):
+    (folder / "weights.safetensors").write_bytes(b"those")
+    module._driven_by.cache_clear()  # as in another process
+
+
+def other_world(folder, monkeypatch):
+    monkeypatch.setattr(module, "WORLD_VERSION", 0)
+    module._driven_by.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (other_weights, "agent_version was driveinsight 1, files .*, is driveinsight 1, files"),
+        (other_world, "world_version was 1, is 0"),
+    ],
+)
+@pytest.mark.parametrize("dropped", [False, True])
+def test_collecting_goes_on_with_the_same_driver_and_world_only(
+    drive, tmp_path, monkeypatch, change, message, dropped
+):
+    """Weights changed under the same name were mixed silently before."""
+    monkeypatch.setattr(module, "_drive", None)  # nothing may be driven
+    (tmp_path / "weights.safetensors").write_bytes(b"these")
+    job = DriveJob(folder=tmp_path, town="small_grid", number=0, driver=f"driveinsight:{tmp_path}")
+    facts = module._driven_by(job.driver)
+    if dropped:
+        job.dropped_path.parent.mkdir()
+        job.dropped_path.write_text(json.dumps({"why": "infractions", **facts}))
+    else:
+        write_drive(job.path, dataclasses.replace(drive, facts={**drive.facts, **facts}))
+    assert not drive_job(job).fresh
+    change(tmp_path, monkeypatch)
+    with pytest.raises(DriveFileError, match=f"{message}.*name another --output"):
+        drive_job(job)
+    module._driven_by.cache_clear()
 
 
 def test_from_a_learners_moments_the_expert_shows_what_it_would_have_done(tmp_path):
@@ -219,5 +274,7 @@ def test_from_a_learners_moments_the_expert_shows_what_it_would_have_done(tmp_pa
 def test_a_folder_holds_the_drives_of_one_driver(tmp_path):
     job = DriveJob(folder=tmp_path, town="small_grid", number=0, driver=IDLE)
     drive_job(job)
-    with pytest.raises(DriveFileError, match="name another --output"):
+    with pytest.raises(
+        DriveFileError, match=r"driver was .*Idle, is expert.*name another --output"
+    ):
         drive_job(dataclasses.replace(job, driver="expert"))

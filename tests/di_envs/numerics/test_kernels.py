@@ -89,9 +89,19 @@ def test_the_digest_of_a_tick_covers_every_module_that_a_tick_runs():
 
 
 def test_every_kernel_of_ours_can_be_found():
-    names = {path.name for path in kernel_sources()}
-    assert {"step.py", "traffic.py", "walkers.py", "geometry.py", "prompt.py"} <= names
-    assert "town.py" not in names
+    names = {path.relative_to(ROOT).as_posix() for path in kernel_sources()}
+    folders = (
+        "numerics",
+        "sensors/camera",
+        "sensors/lidar",
+        "town",
+        "world/traffic",
+        "world/walkers",
+    )
+    for folder in (*(f"di_envs/{name}" for name in folders), "agents/expert"):
+        assert any(name.startswith(f"{folder}/") for name in names), folder
+    assert {"di_envs/world/step.py", "di_envs/prompt_filling.py"} <= names
+    assert "di_envs/town/town.py" not in names
 
 
 def test_the_capability_names_the_cpu_and_hides_nothing():

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from di_envs.sensors.scene.actor_boxes import DETAIL_M
+from di_envs.sensors.scene.actor_parts import PARTS, Role
 from di_envs.sensors.scene.boxes import Material
+from di_envs.sensors.scene.raster import TEXEL_M
 from di_envs.sensors.scene.scene import ROOM, box_buffer, build_scene, collect_boxes, scene_of
-from di_envs.sensors.scene.surfaces import TEXEL_M
 from di_envs.sensors.scene.tags import PALETTE, Tag
 from di_envs.town.lanes import LaneKind, LightState
 from di_envs.town.loading import load_town
@@ -235,6 +237,38 @@ def test_brake_lights_and_indicators_shine(world, scene):
     count = int(boxes.count[0])
     lit = (boxes.material[:count] == Material.LAMP) & (boxes.instance[:count] == car + 1)
     assert lit.sum() == 4  # two brake lights, two indicators on the left
+
+
+def test_far_away_only_large_parts_are_drawn_and_small_ones_that_shine(world, scene):
+    snapshot = world.save()
+    state = views_of(snapshot.record)
+    (car, *_) = np.flatnonzero(state.kind == ActorKind.CAR)[1:]
+    state.brake_light[:], state.indicator[:], state.tick[...] = 0, 0, 0
+    drawn = []
+    for away_m, side in ((5.0, 0), (DETAIL_M + 5.0, 0), (DETAIL_M + 5.0, 1)):
+        state.x[0], state.y[0] = state.x[car] - away_m, state.y[car]
+        state.indicator[car] = side
+        world.restore(snapshot)
+        boxes = collected(world, scene)
+        drawn.append(int((boxes.instance[: int(boxes.count[0])] == car + 1).sum()))
+    # body, glass, roof, 2 tail lights; 4 wheels, 2 headlights, 4 indicators; 2 of them on the right
+    assert drawn == [5 + 10, 5, 5 + 2]
+
+
+@pytest.mark.parametrize(
+    ("kind", "tags"),
+    [
+        (ActorKind.CAR, {Tag.CAR}),
+        (ActorKind.BICYCLE, {Tag.BICYCLE, Tag.RIDER}),
+        (ActorKind.MOTORCYCLE, {Tag.MOTORCYCLE, Tag.RIDER}),
+        (ActorKind.WALKER, {Tag.PEDESTRIANS}),
+    ],
+)
+def test_who_sits_on_two_wheels_is_a_rider(kind, tags):
+    parts = slice(PARTS.start[kind], PARTS.start[kind + 1])
+    assert set(PARTS.tag[parts]) == tags
+    skin = PARTS.role[parts] == Role.SKIN
+    assert kind == ActorKind.CAR or set(PARTS.tag[parts][skin]) <= {Tag.RIDER, Tag.PEDESTRIANS}
 
 
 def test_too_many_boxes_for_the_room_are_left_out(world, scene):

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from di_envs.sensors.camera.raster_spans import add_colours, fetch, texel_places, water_depths
-from di_envs.sensors.camera.spans import hit_box, hit_upright, run_end
+from di_envs.sensors.camera.spans import BoxRays, hit_box, hit_upright, run_end
 
 F = np.float32
 
@@ -31,13 +31,12 @@ def test_an_upright_box_is_hit_as_any_box_is_to_the_last_bit(numbers):
     for upright in (False, True):
         depth, code = np.full(70, 1000.0, F), np.full(70, -1, np.int32)
         start, box = F(3.0), np.int32(12)
+        level = F(0.0)  # what a column adds to the rise of a ray
+        rays = BoxRays(rx, ry, rz, ax, ay, dz, bx, by, level, half, half, half)
         if upright:
-            hit_upright(depth, code, start, box, rx, ry, rz, ax, ay, dz, bx, by, half, half, half)
+            hit_upright(depth, code, start, box, rays)
         else:
-            level = F(0.0)  # what a column adds to the rise of a ray
-            hit_box(
-                depth, code, start, box, rx, ry, rz, ax, ay, dz, bx, by, level, half, half, half
-            )
+            hit_box(depth, code, start, box, rays)
         seen.append((depth.tobytes(), code.tobytes()))
     assert seen[0] == seen[1]
 

@@ -91,7 +91,7 @@ def test_a_damaged_cache_file_is_replaced(tmp_path, damage):
         )
     assert same(parsed, load_town("toy", cache_folder=tmp_path))
     assert path.is_dir() or path.read_bytes() == content
-    assert not list(tmp_path.glob("*.tmp"))
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path):
@@ -108,7 +108,18 @@ def test_two_processes_may_fill_the_cache_at_once(tmp_path):
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         hashes = pool.map(_load_toy, [str(tmp_path)] * 2, chunksize=1)
     assert hashes[0] == hashes[1]
-    assert [path.name for path in tmp_path.iterdir()] == [f"{hashes[0]}.npz"]
+    assert [path.name for path in tmp_path.iterdir()] == [f"{cache.cache_key(hashes[0])}.npz"]
+
+
+def test_an_edited_reader_reads_anew_what_is_still_the_same_town(tmp_path, monkeypatch):
+    before = load_town("toy", cache_folder=tmp_path)
+    monkeypatch.setattr(cache, "reader_version", lambda: "another")
+    read = []
+    parse = loading._parse
+    monkeypatch.setattr(loading, "_parse", lambda *given: read.append(1) or parse(*given))
+    assert load_town("toy", cache_folder=tmp_path).content_hash == before.content_hash
+    assert read == [1]
+    assert len(list(tmp_path.glob("*.npz"))) == 2
 
 
 def test_the_hash_tells_maps_and_signals_apart(tmp_path):

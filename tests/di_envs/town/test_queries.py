@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from di_envs.town.lanes import LaneKind
+from di_envs.town.lanes_below import lanes_below_box
 from di_envs.town.queries import (
-    ANY_MASK,
     DRIVING_MASK,
-    lanes_below_box,
     nearest_driving_lane_towards,
     nearest_lane,
     pose_at,
@@ -92,7 +91,9 @@ def test_the_nearest_lane_is_found_with_its_station_and_distance(street):
 
 def test_only_lanes_of_the_asked_kinds_count(street):
     beside = (30.0, 5.0, 0.0, 8.0)
-    assert nearest_lane(street, *beside, ANY_MASK)[0] == only(street, -2)
+    assert nearest_lane(street, *beside, sum(1 << int(kind) for kind in LaneKind))[0] == only(
+        street, -2
+    )
     assert nearest_lane(street, *beside, DRIVING_MASK)[0] == only(street, -1)
     assert nearest_lane(street, *beside, 1 << int(LaneKind.PARKING))[0] == -1
 

@@ -198,10 +198,13 @@ def test_listed_arms_have_what_is_listed_and_others_nothing(tmp_path):
         ({"junction": "9", "kind": "stop", "arms": "steem"}, "did you mean 'stem'"),
         ({"junction": "10", "kind": "stop"}, "has no junction '10'; it has 9"),
         ({"centre": [50, 50], "kind": "stop"}, "no junction within 12 m"),
-        ({"centre": "here", "kind": "stop"}, r"must be \[x, y\] in metres"),
+        (
+            {"centre": "here", "kind": "stop"},
+            r"junctions\[0\]\.centre: expected a list or null, got 'here'",
+        ),
         ({"kind": "stop"}, "neither 'junction' nor 'centre'"),
         ({"junction": "9", "kind": "stop", "arms": [{"at": [50, 50]}]}, "no arm that ends"),
-        (["9"], "must be an object"),
+        (["9"], "expected an object, got a list of 1"),
     ],
 )
 def test_a_wrong_sidecar_says_what_is_wrong(tmp_path, junction, message):
@@ -219,7 +222,7 @@ def test_a_junction_listed_twice_is_refused(tmp_path):
 def test_a_sidecar_that_is_no_json_or_has_unknown_keys_is_refused(tmp_path):
     path = tmp_path / "bad.json"
     path.write_text("junctions: 9", encoding="utf-8")
-    with pytest.raises(ValueError, match="is not JSON"):
+    with pytest.raises(ValueError, match="is not whole JSON"):
         load(crossing(), tmp_path, signals=path)
     with pytest.raises(ValueError, match="did you mean 'junctions'"):
         load(crossing(), tmp_path, signals=sidecar(tmp_path, junctons=[]))
@@ -314,5 +317,7 @@ def test_a_sidecar_replaces_the_limits_that_the_maps_editor_left(shared, tmp_pat
 
 def test_a_speed_limit_without_a_number_is_refused(tmp_path):
     path = sidecar(tmp_path, speed_limits=[{"map_kmh": "fast", "kmh": 50}])
-    with pytest.raises(ValueError, match=r"speed_limits\[0\] needs the numbers map_kmh and kmh"):
+    with pytest.raises(
+        ValueError, match=r"speed_limits\[0\]\.map_kmh: expected a number, got 'fast'"
+    ):
         load(crossing(), tmp_path, signals=path)

@@ -44,7 +44,9 @@ def test_the_table_is_turned_from_south_to_north_once():
 
 def test_a_misspelt_key_is_refused_with_the_right_one(tmp_path):
     path = changed(tmp_path, lambda table: table["streets"][0].update(seciton="wide"))
-    with pytest.raises(ValueError, match="no field 'seciton'; did you mean 'section'"):
+    with pytest.raises(
+        ValueError, match=r"streets\[0\]: unknown field 'seciton'; did you mean 'section'"
+    ):
         read_plan(path)
 
 

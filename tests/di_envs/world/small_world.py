@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from di_envs.town.cache import freeze
 from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, SignalKind, Signals
 from di_envs.town.town import Town
 from di_envs.world.dynamics import EgoModel
@@ -160,7 +161,8 @@ def make_town(
     signals: Signals | None = None,
     crosswalks: Crosswalks | None = None,
 ) -> Town:
-    return Town(
+    """A town of these pieces; frozen as a loaded one is, so that one machine code serves both."""
+    town = Town(
         name="piece",
         lanes=lanes if lanes is not None else make_lanes(),
         signals=signals if signals is not None else make_signals(),
@@ -171,6 +173,7 @@ def make_town(
         content_hash="piece",
         opendrive="",
     )
+    return freeze(town)
 
 
 def make_routes(points: np.ndarray | None = None, timeout_s: float = 1e6) -> Routes:

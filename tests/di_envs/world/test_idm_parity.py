@@ -21,10 +21,10 @@ from di_envs.world.traffic.car_following import (
     TIME_WANTED_S,
     idm_acceleration,
 )
-from di_envs.world.traffic.decisions import allowed_speed
 from di_envs.world.traffic.lane_change import MAX_BRAKING_IMPOSED_MPS2, MIN_GAIN_MPS2, _mobil
 from di_envs.world.traffic.motion import place_vehicle
 from di_envs.world.traffic.occupancy import fill_occupancy, make_occupancy
+from di_envs.world.traffic.speed_choice import allowed_speed
 from di_envs.world.traffic.tables import traffic_tables
 from tests.di_envs.world.small_world import LaneSpec, make_lanes, make_town
 

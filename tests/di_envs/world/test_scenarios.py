@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from di_envs.prompt import OBSTACLES, fill_obstacles
+from di_envs.prompt import OBSTACLES
+from di_envs.prompt_surroundings import fill_obstacles
 from di_envs.town.lanes import LightState
 from di_envs.world.scenarios.tables import AHEAD, DONE
 from di_envs.world.state import ActorKind, EventKind

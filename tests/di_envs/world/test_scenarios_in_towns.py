@@ -17,7 +17,7 @@ from di_envs.world.scenarios.tables import AHEAD, DONE
 from di_envs.world.state import ActorKind, EventKind, State
 from di_envs.world.world import World, WorldConfig
 from tests.di_envs.world.test_traffic_soak import overlapping_pair
-from tests.di_envs.world.toy_scene import Scene
+from tests.di_envs.world.toy_scene import ToyScene
 
 STANDING = np.array([[0.0, 0.0, 1.0]])
 
@@ -60,7 +60,7 @@ def test_oncoming_traffic_brakes_for_somebody_who_crosses_and_then_goes_on(speed
         and np.ptp(plan.points[point - 5 : point + 25, 3]) < 0.01
     )
     somebody = ScenarioTrigger(type=3, subtype="", point=trigger)
-    scene = Scene(plans=(dataclasses.replace(plan, scenarios=(somebody,)),))
+    scene = ToyScene(plans=(dataclasses.replace(plan, scenarios=(somebody,)),))
     lanes, slot = scene.town.lanes, scene.world.view.capacity.first_scenario_actor
     with scene.edit() as state:
         state.x[0], state.y[0], state.z[0], state.yaw[0] = plan.points[trigger]

@@ -27,8 +27,8 @@ from di_envs.world.traffic.car_following import (
     idm_acceleration,
     safe_speed,
 )
-from di_envs.world.traffic.decisions import LINE_GAP_M
 from di_envs.world.traffic.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
+from di_envs.world.traffic.speed_choice import LINE_GAP_M
 from di_envs.world.world import World, WorldConfig
 from tests.di_envs.world.toy_scene import (
     EAST_TO_1,
@@ -49,7 +49,7 @@ from tests.di_envs.world.toy_scene import (
     WEST_TO_1,
     WEST_TO_1_RIGHT,
     WEST_TO_2,
-    Scene,
+    ToyScene,
 )
 
 TOY = load_suite("toy")
@@ -114,7 +114,7 @@ def test_no_room_means_standing_still():
 
 def test_a_car_stops_behind_one_that_stands_and_never_touches_it():
     """In the middle street, which has one lane: there is no way round."""
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     scene.put(0, [MIDDLE_TO_2], 64.0, speed=8.0)
     scene.put(1, [MIDDLE_TO_2], 20.0)
     gaps = []
@@ -131,7 +131,7 @@ def test_a_car_stops_behind_one_that_stands_and_never_touches_it():
 @pytest.mark.parametrize(("offset_m", "stops"), [(0.0, True), (3.5, False)])
 def test_a_car_reacts_to_an_ego_in_its_lane_and_to_none_on_the_opposite_lane(offset_m, stops):
     plan = TOY.plans(load_town("toy"), ["1"])[0]
-    scene = Scene(vehicles=1, plans=(plan,))
+    scene = ToyScene(vehicles=1, plans=(plan,))
     with scene.edit() as state:  # the middle street leads south: x falls to its right
         state.x[0], state.y[0], state.yaw[0] = -1.75 + offset_m, 10.0, math.pi / 2.0
         locate_ego(state, scene.town.lanes, 0)
@@ -146,7 +146,7 @@ def test_a_car_reacts_to_an_ego_in_its_lane_and_to_none_on_the_opposite_lane(off
 
 
 def test_a_car_stops_before_a_red_line_and_goes_at_green():
-    scene = Scene()
+    scene = ToyScene()
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], 60.0, speed=12.0)
     scene.show("1", 1)  # another's turn: 15 s, the third's: 15 s, then ours
     gone = []
@@ -165,7 +165,7 @@ def test_a_car_stops_before_a_red_line_and_goes_at_green():
 @pytest.mark.parametrize(("before_m", "stops"), [(35.0, True), (4.0, False)])
 def test_at_yellow_one_stops_who_can_and_another_goes_on(before_m, stops):
     """From 12 m/s, braking at 4 m/s2 takes 18 m."""
-    scene = Scene()
+    scene = ToyScene()
     scene.show("1", 0, ticks=190)  # 0.5 s of green left
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], before_m + 6.0, speed=12.0)
     for _ in scene.run(8.0):
@@ -188,7 +188,7 @@ def test_who_goes_on_at_yellow_is_across_before_red_and_who_stops_can(speed, dis
 
 def test_who_stands_a_hair_before_the_line_loses_the_grant_at_yellow():
     """Somebody on the crosswalk may have kept it there while it was green."""
-    scene = Scene()
+    scene = ToyScene()
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], 0.05)
     scene.show("1", 0, ticks=GREEN_TICKS)
     with scene.edit() as state:
@@ -199,7 +199,7 @@ def test_who_stands_a_hair_before_the_line_loses_the_grant_at_yellow():
 
 
 def test_a_car_stops_at_the_stop_sign_and_then_goes():
-    scene = Scene()
+    scene = ToyScene()
     scene.put(0, [MIDDLE_TO_2, MIDDLE_RIGHT], 40.0, speed=8.0)
     stopped = False
     for state in scene.run(20.0):
@@ -211,7 +211,7 @@ def test_a_car_stops_at_the_stop_sign_and_then_goes():
 
 def test_a_minor_way_waits_for_a_car_on_the_major_road():
     """The middle street turns left across the way of one who comes from the west at 50 km/h."""
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     scene.put(0, [MIDDLE_TO_2, MIDDLE_LEFT], 1.0)
     scene.put(1, [WEST_TO_2, FROM_WEST_STRAIGHT], 30.0, speed=12.0)
     ways = scene.lane(WEST_TO_2), scene.lane(FROM_WEST_STRAIGHT)
@@ -226,7 +226,7 @@ def test_a_minor_way_waits_for_a_car_on_the_major_road():
 
 
 def test_a_left_turn_waits_for_oncoming_traffic():
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     scene.put(0, [WEST_TO_2, FROM_WEST_LEFT], 3.0, speed=3.0)
     scene.put(1, [EAST_TO_2, FROM_EAST_STRAIGHT], 25.0, speed=12.0)
     order = []
@@ -238,7 +238,7 @@ def test_a_left_turn_waits_for_oncoming_traffic():
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_those_who_stop_at_signs_go_in_the_order_in_which_they_came(first):
-    scene = Scene(vehicles=2, town="town05")
+    scene = ToyScene(vehicles=2, town="town05")
     ways = _ways_between_signs(scene.town)
     for actor in (0, 1):
         scene.put(actor, ways[actor], 0.5 if actor == first else 12.0)
@@ -274,7 +274,7 @@ def _ways_between_signs(town: Town) -> list[list[int]]:
 
 def test_a_junction_is_not_entered_when_its_exit_is_full():
     """A car that stands just behind the junction leaves no room for a second one."""
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     exit_name = ("12", -1)
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT, exit_name], 20.0, speed=8.0)
     scene.put(1, [exit_name], scene.room(exit_name) - 7.0)  # its rear 3 m behind the junction
@@ -293,7 +293,7 @@ def test_a_junction_is_not_entered_when_its_exit_is_full():
 
 def test_who_has_long_stood_before_a_full_exit_takes_another_way():
     """From the right lane of the western street right, where somebody stands, or straight on."""
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     right, straight = scene.lane(NORTH_RIGHT), scene.lane(NORTH_STRAIGHT_RIGHT)
     scene.put(0, [WEST_TO_1_RIGHT, NORTH_RIGHT], 3.0)
     scene.put(1, [MIDDLE_TO_2], 63.0)  # 3 m of room
@@ -315,7 +315,7 @@ def test_who_has_long_stood_before_a_full_exit_takes_another_way():
 def test_two_ways_that_cross_are_never_driven_at_once():
     """Left from the middle street and straight on from the east, over many meetings."""
     for gap_m in range(5, 60, 5):
-        scene = Scene(vehicles=2)
+        scene = ToyScene(vehicles=2)
         scene.put(0, [MIDDLE_TO_2, MIDDLE_LEFT], 1.0)
         scene.put(1, [EAST_TO_2, FROM_EAST_STRAIGHT], float(gap_m), speed=10.0)
         for state in scene.run(12.0):
@@ -325,7 +325,7 @@ def test_two_ways_that_cross_are_never_driven_at_once():
 def test_a_car_that_gets_its_next_grant_does_not_hide_others_who_hold_its_last_one():
     """Car 2 leaves junction 2 so fast that it is let into junction 1 in the same tick; car 1 still
     comes from the east by the same way, and car 0 would cross it."""
-    scene = Scene(vehicles=3)
+    scene = ToyScene(vehicles=3)
     scene.put(0, [WEST_TO_2, FROM_WEST_LEFT], 3.0)
     scene.put(1, [EAST_TO_2_RIGHT, FROM_EAST_RIGHT], 12.0, speed=5.0)
     scene.put(2, [MIDDLE_TO_1, MIDDLE_RIGHT_AT_1], scene.room(MIDDLE_TO_1) - 3.9, speed=14.0)
@@ -345,7 +345,7 @@ def test_a_car_that_gets_its_next_grant_does_not_hide_others_who_hold_its_last_o
 @pytest.mark.parametrize("somebody", [True, False])
 def test_a_car_waits_at_green_while_a_walker_is_on_the_crosswalk(somebody):
     """The strip begins 0.75 m behind the stop line; 13 m of road at 1.3 m/s take 10 s."""
-    scene = Scene(vehicles=1, walkers=1)
+    scene = ToyScene(vehicles=1, walkers=1)
     strip = int(np.flatnonzero(scene.world._scenery.walk.crosswalk == 0)[0])
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], 50.0, speed=12.0)
     scene.show("1", 0)
@@ -369,7 +369,7 @@ def test_a_car_waits_at_green_while_a_walker_is_on_the_crosswalk(somebody):
 
 @pytest.mark.parametrize("allowed", [True, False])
 def test_a_slow_bicycle_is_overtaken_only_where_the_marks_allow_it(allowed):
-    scene = Scene(vehicles=2)
+    scene = ToyScene(vehicles=2)
     if not allowed:
         lanes = scene.town.lanes._replace(change=np.zeros_like(scene.town.lanes.change))
         scene.world.town = scene.town = replace(scene.town, lanes=lanes)

@@ -7,13 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from di_envs.observation import Observer
+from di_envs.observer import Observer
 from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import TICK_S, ActorKind, EventKind, views_of
 from di_envs.world.world import Snapshot, World, WorldConfig
-from tests.di_envs.world.toy_scene import EAST_TO_1, MIDDLE_TO_2, WEST_TO_2_RIGHT, Scene
+from tests.di_envs.world.toy_scene import EAST_TO_1, MIDDLE_TO_2, WEST_TO_2_RIGHT, ToyScene
 
 SUITE = load_suite("toy")
 GO = np.array([[0.6, 0.0, 0.0]])
@@ -146,7 +146,7 @@ def test_removing_a_vehicle_changes_no_turn_that_another_takes():
     """Three vehicles far from each other; each chooses its lanes from its own keys."""
     ways = []
     for removed in (None, 1, 2):
-        scene = Scene(vehicles=3)
+        scene = ToyScene(vehicles=3)
         scene.put(0, [WEST_TO_2_RIGHT], 60.0, speed=10.0)
         scene.put(1, [EAST_TO_1], 200.0)
         scene.put(2, [MIDDLE_TO_2], 50.0)

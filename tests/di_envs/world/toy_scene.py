@@ -33,7 +33,7 @@ MIDDLE_RIGHT_AT_1 = ("2008", -1)
 Name = tuple[str, int]
 
 
-class Scene:
+class ToyScene:
     """A town with nobody in it but whom a test puts there: egos, then vehicles, walkers."""
 
     def __init__(

@@ -5,15 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 import tarfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from agents.versions import agent_version
 from leaderboard.commands.cli import main
 from leaderboard.commands.ending import EXIT_USAGE
-from leaderboard.records.versions import agent_hash
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +77,13 @@ def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_pa
     assert "planner (" in out
 
 
-def test_a_policys_hash_changes_with_its_weights(policy, tmp_path):
-    before = agent_hash(f"driveinsight:{policy}")
-    assert before == agent_hash(f"driveinsight:{policy}")
-    (tmp_path / "weights.safetensors").write_bytes(b"other")
-    assert agent_hash(f"driveinsight:{tmp_path}") != before
+def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy, tmp_path):
+    copy = Path(shutil.copytree(policy, tmp_path / "copy"))
+    before = agent_version(f"driveinsight:{policy}")
+    (copy / "README.md").write_text("another card")
+    assert agent_version(f"driveinsight:{copy}") == before
+    (copy / "weights.safetensors").write_bytes(b"other")
+    assert agent_version(f"driveinsight:{copy}") != before
 
 
 @pytest.mark.parametrize(
@@ -133,8 +137,8 @@ def test_shards_hold_a_samples_files_one_after_the_other(shards, data):
     assert about["waypoints_valid"] == 8
 
 
-def test_a_shard_rendered_again_has_the_same_bytes(shards, data, tmp_path):
-    path = sorted(shards.iterdir())[0]
+def test_shards_rendered_again_by_two_processes_have_the_same_bytes(shards, data, tmp_path):
     arguments = ["--data", str(data), "--output", str(tmp_path), "--cameras", "rl"]
-    assert main(["export", *arguments, "--drives-per-shard", "1"]) == 0
-    assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+    assert main(["export", *arguments, "--drives-per-shard", "1", "--workers", "2"]) == 0
+    files = {path.name: path.read_bytes() for path in sorted(shards.iterdir())}
+    assert {path.name: path.read_bytes() for path in sorted(tmp_path.iterdir())} == files

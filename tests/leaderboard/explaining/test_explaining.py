@@ -9,14 +9,16 @@ import pytest
 
 from agents.explain.look import look_at
 from di_envs.edits.text import EditError
-from di_envs.edits.world import read_world_edits
+from di_envs.edits.world import MoveActor, read_world_edits
 from leaderboard.explaining.explanation import ExplainError
+from leaderboard.explaining.questions import questions_about, read_asked
 from leaderboard.explaining.route import explain_route
 from leaderboard.pages.explain_tables import path_moves_m
 from leaderboard.records.chosen_route import RouteChoiceError
 from leaderboard.replaying.branch import branch, branch_run
+from leaderboard.replaying.recorded_agent import RetraceError, retrace_env, run_agent
 from leaderboard.replaying.replay import ReplayError
-from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.untrained import save_untrained
 
@@ -128,6 +130,28 @@ def test_edits_of_what_is_seen_of_the_policy_and_of_the_world_change_what_they_a
     assert noise.future.checks[0] == what_if.base.future.checks[0]  # it sees the same at first
     places = [np.asarray(a.future.film.columns()["actor_x"].values) for a in (what_if.base, moved)]
     assert not np.array_equal(*places)
+
+
+def test_an_edit_asked_about_draws_what_a_run_with_it_draws_however_it_is_written(run):
+    what_if = explain_route(
+        run,
+        run.routes[0].route_id,
+        every_s=9,
+        at_s=0.2,
+        what_if="noise:bev,sigma=5; noise:bev,sigma=5.00,seed=0",
+        ahead_s=0.2,
+    ).what_if
+    one, other = what_if.answers
+    assert one.edit == other.edit == "noise:bev,sigma=5"
+    assert np.array_equal(one.look.response.waypoints, other.look.response.waypoints)
+
+
+def test_questions_can_be_asked_as_values(run):
+    env = retrace_env(run)
+    asked = read_asked("set:speed=3@junction<20m; move:actor=1,ahead=3")
+    seen, moved = questions_about(asked, 0.8, run, env)
+    assert seen.seen.texts == ("set:speed=3@junction<20m&t>0.75",)
+    assert (moved.world, moved.text) == (MoveActor(actor=1, ahead_m=3.0), "move:actor=1,ahead=3")
 
 
 def test_a_drive_to_its_end_keeps_its_status(run):

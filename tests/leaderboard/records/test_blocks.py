@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import zlib
 
 import numpy as np
@@ -61,3 +62,32 @@ def test_damage_is_found():
     longer = base64.b64encode(zlib.compress(zlib.decompress(base64.b64decode(text)) + b"\0"))
     with pytest.raises(BlockError, match="13 B"):
         read_block(longer.decode())
+
+
+def _packed(head: str, body: bytes = b"") -> str:
+    return base64.b64encode(zlib.compress(head.encode() + b"\n" + body)).decode()
+
+
+def _head(**column: object) -> str:
+    return json.dumps({"meta": {}, "columns": [{"name": "x", "count": 0, "step": 1} | column]})
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ('{"meta": {}}', "the block's head: columns: is missing"),
+        ("[" * 100_000, "the block's head: is nested deeper than 64"),
+        (_head(count="3"), r"columns\[0\]\.count: expected a whole number, got '3'"),
+        (_head(count=-1), "impossible count"),
+        (_head(differences=99_999_999), "impossible count or differences"),
+    ],
+    ids=["missing", "deep", "type", "negative", "differences"],
+)
+def test_a_head_that_is_wrong_is_refused_with_its_place(head, said):
+    with pytest.raises(BlockError, match=f"the block is damaged: .*{said}"):
+        read_block(_packed(head))
+
+
+def test_a_block_that_unpacks_to_too_much_is_refused():
+    with pytest.raises(BlockError, match="more than 268435456 B"):
+        read_block(base64.b64encode(zlib.compress(bytes(2**28 + 1), 1)).decode())

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1
 from di_envs.world.kinds import EventKind
 from leaderboard.commands.cli import main
 from leaderboard.records.record import AGENT_CRASHED, WORKER_DIED
 from leaderboard.records.rescoring import rescored, rescored_route
 from leaderboard.records.results import read_run, write_run
-from leaderboard.scoring.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1
 from leaderboard.scoring.score import Score
 from tests.leaderboard.made_records import event, route, run_of
 

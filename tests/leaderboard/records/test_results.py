@@ -18,6 +18,7 @@ from leaderboard.records.record import LOST, RouteRecord, RunRecord
 from leaderboard.records.results import (
     CARLA_FILE,
     RECORD_FILE,
+    DamagedError,
     ResultsError,
     prepare_folder,
     read_run,
@@ -277,7 +278,9 @@ def test_half_a_file_is_named_as_such(tmp_path):
 @pytest.mark.parametrize("content", ["[]", "{}", '{"format": "other"}'])
 def test_a_foreign_file_is_named_as_such(tmp_path, content):
     (tmp_path / RECORD_FILE).write_text(content)
-    with pytest.raises(ResultsError, match=r"not a driveinsight\.json of ours"):
+    with pytest.raises(
+        ResultsError, match=r"driveinsight\.json: .*its format is not 'driveinsight-run'"
+    ):
         read_run(tmp_path)
 
 
@@ -288,22 +291,44 @@ def test_a_file_of_another_version_or_without_a_field_is_refused(tmp_path):
         read_run(tmp_path)
     del content["cpu"]
     (tmp_path / RECORD_FILE).write_text(json.dumps(content))
-    with pytest.raises(ResultsError, match="'cpu'"):
+    with pytest.raises(ResultsError, match=r"driveinsight\.json: cpu: is missing"):
         read_run(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("find", "put", "said"),
     [
-        ('"game_s": 200.0', '"game_s": "200"', "game_s must be of type float"),
-        ('"steps": 2000', '"steps": true', "steps must be of type int"),
+        ('"game_s": 200.0', '"game_s": "200"', "game_s: expected a number, got '200'"),
+        ('"steps": 2000', '"steps": true', "steps: expected a whole number, got true"),
         ('"infraction_score":0.7', '"infraction_score":NaN', "NaN is no number"),
-        ('"red_light"', '"blue_light"', "BLUE_LIGHT"),
-        (' "steps": 2000,\n', "", "KeyError.*steps"),
-        ('"tick":40', '"tick":"40"', "tick must be of type int"),
-        ('"format_version": 2', '"format_version": 1', "format version 1, this program reads 2"),
-        ('"driveinsight-route"', '"driveinsight-run"', "is not a 0000.json of ours"),
+        (
+            '"red_light"',
+            '"blue_light"',
+            r"events\[0\]\.kind: unknown 'blue_light'; did you mean 'red_light'",
+        ),
+        (' "steps": 2000,\n', "", "0000.json: steps: is missing"),
+        ('"tick":40', '"tick":"40"', r"events\[0\]\.tick: expected a whole number, got '40'"),
+        ('"format_version": 3', '"format_version": 2', "format version 2, this program reads 3"),
+        ('"driveinsight-route"', '"driveinsight-run"', "its format is not 'driveinsight-route'"),
         ('"index": 0', '"index": 7', "it was renamed"),
+        ('"steps": 2000', '"step": 1, "steps": 2000', "field 'step'; did you mean 'steps'"),
+        (
+            '"infraction_score":0.7',
+            '"infraction_scor":0.7',
+            "score: unknown field 'infraction_scor'",
+        ),
+        (
+            '"infraction_score":0.7',
+            '"infraction_score":[7]',
+            "score.infraction_score: expected a num",
+        ),
+        (
+            '"infraction_score":0.7',
+            '"infraction_score":0.8',
+            "score.driving_score: 35.0 is not the product",
+        ),
+        ('"infraction_score":0.7', '"infraction_score":1e999', "1e999 is too large a number"),
+        ('"tick":40', '"tick":18446744073709551616', "is too large a whole number"),
     ],
 )
 def test_a_garbled_route_is_refused_with_what_is_wrong(tmp_path, find, put, said):
@@ -313,6 +338,27 @@ def test_a_garbled_route_is_refused_with_what_is_wrong(tmp_path, find, put, said
     assert find in text
     path.write_text(text.replace(find, put))
     with pytest.raises(ResultsError, match=said):
+        read_run(tmp_path)
+
+
+@pytest.mark.parametrize("absurd", ["[" * 100_000, '{"a":' * 100_000, "9" * 100_000], ids=len)
+def test_an_absurd_route_is_refused_in_one_line(tmp_path, absurd):
+    write_run(tmp_path, run_of(RED))
+    path = tmp_path / "routes" / "0000.json"
+    path.write_text(path.read_text().replace('"steps": 2000', f'"steps": {absurd}'))
+    with pytest.raises(DamagedError) as caught:
+        read_run(tmp_path)
+    said = str(caught.value)
+    assert said.startswith(f"{path}: is ")
+    assert "\n" not in said
+    assert len(said) < len(str(path)) + 250
+
+
+def test_routes_inside_the_runs_own_file_are_refused(tmp_path):
+    content = {**run_to_json(run_of(RED)), "routes": []}
+    write_run(tmp_path, run_of(RED))
+    (tmp_path / RECORD_FILE).write_text(json.dumps(content))
+    with pytest.raises(DamagedError, match="unknown field 'routes'; each has a file of its own"):
         read_run(tmp_path)
 
 

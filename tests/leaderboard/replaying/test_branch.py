@@ -105,6 +105,25 @@ def test_a_branched_drive_can_be_written_replayed_and_verified(run, hit, tmp_pat
     assert not verify_run(read_run(tmp_path), tmp_path).stands
 
 
+def test_a_branch_of_a_branch_keeps_what_was_done_to_the_world_later(run, hit):
+    edits = read_world_edits(f"remove:actor={hit.other}")
+    edited = branch_run(run, branch(run, run.routes[0], 4.0, edits))
+    again = branch(edited, edited.routes[0], 2.0, ())
+    assert same_future(again.recorded, again.edited)
+    removed = f"remove:actor={hit.other}@t=4.0"
+    dark = branch(edited, edited.routes[0], 2.0, read_world_edits("change:weather=WetNoon"))
+    assert dark.edited.interventions == (removed, "change:weather=WetNoon@t=2.0")
+    assert dark.edited.state_hash == edited.routes[0].state_hash  # this agent sees no weather
+    gone = branch(edited, edited.routes[0], 2.0, ())
+    assert gone.edited.events == edited.routes[0].events
+
+
+def test_a_run_scored_by_other_rules_than_its_environment_branches_into_its_own_rewards(run):
+    scored = dataclasses.replace(run, rules="carla-2.1")  # its options name none
+    edited = branch(scored, run.routes[0], 8.0, ()).edited
+    assert edited.reward_hash == run.routes[0].reward_hash
+
+
 def test_an_edit_changes_the_world_between_two_decisions(run, hit):
     edited = branch_run(
         run, branch(run, run.routes[0], 2.0, read_world_edits("force:light=0,state=red"))
@@ -167,5 +186,5 @@ def test_the_tables_tell_which_events_are_only_in_one_future(run, hit):
     futures = branch(run, run.routes[0], 3.0, read_world_edits(f"remove:actor={hit.other}"))
     _, events = branch_tables(futures)
     cells = [list(column.cells) for column in events.columns]
-    row = next(i for i, cell in enumerate(cells[1]) if "collision vehicle" in cell)
+    row = next(i for i, cell in enumerate(cells[1]) if "vehicle hit" in cell)
     assert cells[2][row] == ""

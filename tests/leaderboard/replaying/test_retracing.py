@@ -11,8 +11,9 @@ from agents import load_agent
 from di_envs import restore, save
 from leaderboard.records.packing import pack
 from leaderboard.records.record import CHECK_TYPE, CONTROL_TYPE
+from leaderboard.replaying.recorded_agent import RetraceError, retrace_env
 from leaderboard.replaying.replay import ReplayError
-from leaderboard.replaying.retracing import RetraceError, retrace, retrace_env
+from leaderboard.replaying.retracing import retrace
 from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.untrained import save_untrained
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from leaderboard.responding.by_situation import by_situation, moments_of, ratios_in
-from leaderboard.responding.claims import CLAIMS, FAILS, HOLDS, OPEN, RISES, STANDS_OUT, examined
+from leaderboard.responding.claims import CLAIMS, RISES, STANDS_OUT, examined
+from leaderboard.statistics.claim_verdict import ClaimVerdict
 from leaderboard.tables.response_tables import claim_rows, situation_rows, tables_of
 from tests.leaderboard.responding.made_drives import made_drive
 
@@ -33,13 +34,17 @@ def test_a_response_three_times_as_strong_in_junctions_holds():
     test = found(drives([3.0, 6.0, 1.0, 2.0]), "traffic_lights", RISES, "junction")
     assert test.strength.value == pytest.approx(4.5 / 1.5)
     assert test.share.value == pytest.approx((3 / 4 + 6 / 7) / (1 / 2 + 2 / 3))
-    assert (test.verdict, test.share_verdict, test.moments) == (HOLDS, HOLDS, 10)
+    assert (test.verdict, test.share_verdict, test.moments) == (
+        ClaimVerdict.HOLDS,
+        ClaimVerdict.HOLDS,
+        10,
+    )
 
 
 def test_an_equal_response_does_not_hold():
     test = found(drives([1.0, 2.0, 2.0, 1.0]), "traffic_lights", RISES, "junction")
     assert test.strength.value == 1.0
-    assert test.verdict == FAILS
+    assert test.verdict == ClaimVerdict.DOES_NOT_HOLD
 
 
 def test_routes_that_disagree_leave_it_open():
@@ -48,12 +53,12 @@ def test_routes_that_disagree_leave_it_open():
         made_drive([[v, 1.0] for v in (1.0, 1.0, 3.0, 3.0)], route=str(r), junction=IN_JUNCTION)
         for r in (7, 8, 9)
     ]
-    assert found(mixed, "traffic_lights", RISES, "junction").verdict == OPEN
+    assert found(mixed, "traffic_lights", RISES, "junction").verdict == ClaimVerdict.UNDECIDED
 
 
 def test_two_routes_are_too_few_to_tell_and_so_are_two_seeds_of_each():
     few = drives([3.0, 6.0, 1.0, 2.0], 2)
-    assert found(few * 3, "traffic_lights", RISES, "junction").verdict == OPEN
+    assert found(few * 3, "traffic_lights", RISES, "junction").verdict == ClaimVerdict.UNDECIDED
 
 
 def test_standing_out_is_over_the_mean_component_in_the_same_moments():
@@ -67,7 +72,7 @@ def test_standing_out_is_over_the_mean_component_in_the_same_moments():
         for route in range(3)
     ]
     assert found(three, "bev", STANDS_OUT, "turning").strength.value == pytest.approx(2.0)
-    assert found(three, "routing", STANDS_OUT, "turning").verdict == FAILS
+    assert found(three, "routing", STANDS_OUT, "turning").verdict == ClaimVerdict.DOES_NOT_HOLD
 
 
 def test_a_sentence_about_a_component_that_the_policy_lacks_is_left_out():
@@ -77,7 +82,7 @@ def test_a_sentence_about_a_component_that_the_policy_lacks_is_left_out():
 
 def test_a_situation_that_never_comes_leaves_it_open():
     test = found(drives([1.0] * 4), "speed", RISES, "stop_sign, not junction")
-    assert (test.verdict, test.moments) == (OPEN, 0)
+    assert (test.verdict, test.moments) == (ClaimVerdict.UNDECIDED, 0)
     assert np.isnan(test.strength.value)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from leaderboard.responding.claims import FAILS, HOLDS, OPEN
 from leaderboard.responding.heads import consistency, head_consistency, likeness, verdict_of_heads
+from leaderboard.statistics.claim_verdict import ClaimVerdict
 from tests.leaderboard.responding.made_drives import made_drive
 
 FIRST, SECOND = [1.0, 0.0], [0.0, 1.0]
@@ -51,18 +51,18 @@ def test_steady_heads_of_different_taste_keep_preferences():
     found = head_consistency(drives(moments([FIRST, SECOND], [FIRST, SECOND])))
     assert found.favourites == (("traffic_lights", "speed"),)
     assert found.excess.value == pytest.approx(2.0)
-    assert verdict_of_heads(found) == HOLDS
+    assert verdict_of_heads(found) == ClaimVerdict.HOLDS
 
 
 def test_steady_heads_of_one_taste_have_none_of_their_own():
     found = head_consistency(drives(moments([FIRST, FIRST], [FIRST, FIRST])))
     assert (found.mean.value, found.excess.value) == pytest.approx((1.0, 0.0))
-    assert verdict_of_heads(found) == FAILS
+    assert verdict_of_heads(found) == ClaimVerdict.DOES_NOT_HOLD
 
 
 def test_two_routes_are_too_few_to_tell():
     few = head_consistency(drives(moments([FIRST, SECOND], [FIRST, SECOND]), routes=2))
-    assert verdict_of_heads(few) == OPEN
+    assert verdict_of_heads(few) == ClaimVerdict.UNDECIDED
 
 
 def test_a_policy_without_attention_has_no_heads():

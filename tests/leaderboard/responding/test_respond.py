@@ -18,7 +18,8 @@ from di_envs.world.state import EventKind
 from leaderboard.commands.cli import EXIT_USAGE, main
 from leaderboard.records.record import EventRecord
 from leaderboard.records.results import write_run
-from leaderboard.replaying.retracing import retrace, retrace_env, run_agent
+from leaderboard.replaying.recorded_agent import retrace_env, run_agent
+from leaderboard.replaying.retracing import retrace
 from leaderboard.responding import measuring
 from leaderboard.responding.drive_responses import drive_responses
 from leaderboard.responding.response_files import (

@@ -13,12 +13,8 @@ from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.lights import GREEN_TICKS, TURN_TICKS, YELLOW_TICKS
 from di_envs.world.state import TICK_S
-from leaderboard.running.bound import (
-    PerfectDriver,
-    light_limited_bound,
-    speed_profile,
-    stop_points,
-)
+from leaderboard.running.bound import light_limited_bound
+from leaderboard.running.perfect_driver import PerfectDriver, speed_profile, stop_points
 from leaderboard.running.quiet_world import QuietWorld
 
 LIMIT_MPS = 12.0

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 from rich.console import Console
 
+import di_envs.suites
+from agents.expert.agent import Expert
+from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera.cameras import CameraRig
+from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.suites import load_suite
 from di_envs.world.state import EventKind
 from di_envs.world.world import Event
 from leaderboard.commands.cli import EXIT_USAGE, main
 from leaderboard.running.drive import drive, event_line
 from leaderboard.running.driver import Driver
+from leaderboard.running.front_camera import FRONT, front_camera, with_front_camera
+from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.video import GIF_WIDTH_PX, VideoError, check_video, open_video
+from leaderboard.running.warm_up import WARM_UP_STEPS
 
 ROUTE = load_suite("toy").specs()[0].route_id
 SPEC = RunSpec(agent="expert", options={"suite": "toy", "traffic": 3, "walkers": 2})
@@ -68,8 +77,88 @@ def test_the_agent_and_the_film_share_one_look_of_one_camera(silent, tmp_path, m
     monkeypatch.setattr(CameraRig, "observe", counted)
     film = tmp_path / "one.gif"
     record = drive(SPEC, route_id=ROUTE, seed=2, console=silent, video=film)
-    resets = 2  # one to compile what the film needs, before the clock runs
-    assert looks == [["camera_front"]] * (record.steps + resets)
+    warmed = 1 + WARM_UP_STEPS  # to compile what the film needs, before the clock runs
+    assert looks == [["camera_front"]] * (warmed + 1 + record.steps)
+
+
+@pytest.mark.parametrize("filmed", [False, True])
+def test_agent_environment_and_route_are_made_once(filmed, silent, tmp_path, monkeypatch):
+    assert len(load_suite("toy").specs()) > 1
+    made = []
+
+    def count(owner, name):
+        original = getattr(owner, name)
+
+        def counted(*arguments, **named):
+            made.append(f"{owner.__name__}.{name}")
+            return original(*arguments, **named)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    count(RouteEnv, "__init__")
+    count(Expert, "__init__")
+    count(di_envs.suites, "plan_route")
+    record = drive(SPEC, seed=2, console=silent, video=tmp_path / "one.gif" if filmed else None)
+    assert record.route_id == ROUTE
+    assert sorted(made) == ["Expert.__init__", "RouteEnv.__init__", "di_envs.suites.plan_route"]
+
+
+HIDING_AGENT = '''
+from agents.base import Requirements, make_control
+
+
+class Counting:
+    """Steers by how often it was asked, and tells nobody."""
+
+    requires = Requirements(observations=("inertial",), branchable=False)
+    asked = 0
+
+    def start(self, plan, seed):
+        return None
+
+    def act(self, observation, memory):
+        self.asked += 1
+        return make_control(0.3, 0.01 * self.asked, 0.0), memory
+
+    def close(self):
+        pass
+'''
+
+
+def test_an_agent_that_hides_its_memory_has_not_decided_before_its_drive(silent, tmp_path):
+    path = tmp_path / "counting.py"
+    path.write_text(HIDING_AGENT)
+    spec = dataclasses.replace(SPEC, agent=f"{path}:Counting")
+    record = drive(spec, route_id=ROUTE, console=silent)
+    assert record.control_array()[0, 1] == np.float32(0.01)
+
+
+def test_an_edited_drive_is_the_one_that_evaluate_scores_camera_or_not(silent, tmp_path):
+    spec = RunSpec(
+        agent=f"{Path(__file__).parents[1] / 'route_followers.py'}:RouteFollower",
+        options={"suite": "toy", "traffic": 0, "walkers": 0},
+        interventions=read_interventions("noise:routing,sigma=0.3; delay:speed,steps=2"),
+    )
+    with Driver(spec) as driver:
+        scored = driver.drive(Job(index=0, route_id=ROUTE, seed=1))
+    film = tmp_path / "one.gif"
+    filmed = drive(spec, route_id=ROUTE, seed=1, console=silent, video=film)
+    assert filmed.fingerprint() == scored.fingerprint()
+    assert filmed.interventions == ("noise:routing,sigma=0.3", "delay:speed,steps=2")
+
+
+def test_the_front_camera_of_the_runs_own_rig_is_used_and_the_shipped_one_where_it_has_none():
+    shipped = front_camera("small")
+    back = rig_of("small").cameras[-1]
+    assert back.name != FRONT
+    for given, expected in (("rl", front_camera("rl")), (Rig(cameras=(back,)), shipped)):
+        options = with_front_camera({"observations": ("prompt",), "cameras": given})
+        assert options == {
+            "observations": ("prompt", "camera"), "cameras": Rig(cameras=(expected,)),
+        }  # fmt: skip
+    assert with_front_camera({"observations": ("prompt",)})["cameras"] == Rig(cameras=(shipped,))
+    seeing = {"observations": ("camera",), "cameras": "rl"}
+    assert with_front_camera(seeing) == seeing
 
 
 def test_a_film_has_a_frame_for_the_reset_and_one_for_every_step(tmp_path, capsys):

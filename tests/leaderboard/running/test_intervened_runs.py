@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import agents
 from di_envs.edits.text import EditError
 from di_envs.edits.world import read_world_edits
 from di_envs.route_env import RouteEnv
@@ -27,6 +29,9 @@ from leaderboard.running.runner import new_run
 from leaderboard.running.setting_up import scene_of, set_up
 from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.studies.comparing import compare_runs
+from wrappers.interventions.losing import Delay
+from wrappers.interventions.presence import Drop
+from wrappers.interventions.values import Noise
 
 AGENT = f"{Path(__file__).parents[1] / 'route_followers.py'}:RouteFollower"
 ROUTE = "97"
@@ -171,6 +176,27 @@ def test_privileged_agents_are_said_to_look_past_edits():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         set_up(spec(agent="expert"), Stopwatch())
+
+
+def test_edits_travel_to_other_processes_as_values():
+    there = pickle.loads(pickle.dumps(spec(EDITS)))
+    assert there == spec(EDITS)
+    assert [type(edit) for edit in there.interventions] == [Noise, Delay, Drop]
+    assert "; ".join(map(str, there.interventions)) == EDITS
+
+
+def test_edits_are_checked_against_the_agent_that_says_what_it_requires(monkeypatch):
+    made = []
+    original = agents._make
+
+    def counted(*arguments):
+        made.append(arguments[0])
+        return original(*arguments)
+
+    monkeypatch.setattr(agents, "_make", counted)
+    with pytest.raises(SetupError, match="no taps that could be edited"):
+        set_up(spec("mask:bev,p=0.3"), Stopwatch())
+    assert made == [AGENT]
 
 
 def test_edits_of_the_world_are_sent_to_where_they_belong():

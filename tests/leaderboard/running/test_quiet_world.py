@@ -13,7 +13,8 @@ from di_envs.town.loading import load_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.state import TICK_S
-from leaderboard.running.bound import PerfectDriver, light_limited_bound, stop_points
+from leaderboard.running.bound import light_limited_bound
+from leaderboard.running.perfect_driver import PerfectDriver, stop_points
 from leaderboard.running.quiet_world import QuietWorld
 
 SEED = 4

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
 import sys
 
@@ -12,7 +11,7 @@ from agents.training.collect import collect
 from leaderboard.commands.cli import main
 from leaderboard.commands.ending import EXIT_USAGE
 from leaderboard.running.jobs import SetupError
-from leaderboard.running.workers.ray_collect import Footing, check_footing, ray_pool
+from leaderboard.running.workers.ray_collect import check_footing, footing_of_driver, ray_pool
 
 TOWN, MOMENTS = "small_grid", 150
 
@@ -39,17 +38,28 @@ def contents(folder):
 
 
 @pytest.mark.parametrize(
-    ("fields", "message"),
+    ("other", "message"),
     [
-        ({"cpu": "z80"}, r"another CPU \(z80, here "),
-        ({"versions": {"numpy": "1.0"}}, r"other versions: .*numpy 1\.0 \(here "),
+        ({"CPU": "z80"}, "CPU z80, not "),
+        ({"numpy": "1.0"}, r"numpy 1\.0, not "),
+        ({"world": "0"}, "world 0, not 1"),
+        ({"the driver": "expert 0"}, "the driver expert 0, not expert 1"),
     ],
 )
-def test_a_machine_that_would_give_other_bits_is_refused(fields, message):
-    here = Footing.here()
-    check_footing(here)
+def test_a_machine_that_would_give_other_bits_is_refused(other, message):
+    here = footing_of_driver("expert")
+    check_footing(here, here)
     with pytest.raises(SetupError, match=message):
-        check_footing(dataclasses.replace(here, **fields))
+        check_footing({**here, **other}, here)
+
+
+def test_a_machine_whose_weights_are_others_is_refused(tmp_path):
+    footings = []
+    for weights in (b"these", b"those"):
+        (tmp_path / "weights.safetensors").write_bytes(weights)
+        footings.append(footing_of_driver(f"driveinsight:{tmp_path}"))
+    with pytest.raises(SetupError, match=r"driveinsight 1, files .*, not driveinsight 1"):
+        check_footing(*footings)
 
 
 def refused(arguments, tmp_path, capsys):

@@ -119,9 +119,9 @@ def scene() -> Scene:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"cpu": "z80"}, "differ in cpu"),
-        ({"versions": {"numpy": "1.0"}}, "differ in versions .*numpy 1.0"),
-        ({"agent_hash": "00"}, "differ in agent_hash"),
+        ({"cpu": "z80"}, r"differ \(the CPU's capability .*, not z80"),
+        ({"versions": {"numpy": "1.0"}}, r"differ \(versions 'numpy' .*, not 1\.0"),
+        ({"agent_version": "00"}, r"differ \(the agent's version constant 1, not 00"),
     ],
 )
 def test_a_machine_that_would_give_other_bits_is_refused(scene, fields, message):

@@ -15,6 +15,7 @@ import pytest
 from rich.console import Console
 
 from di_envs.numerics.kernels import cpu_capability
+from di_envs.rules import CARLA_1_0
 from di_envs.suites import load_suite
 from leaderboard.records.record import (
     AGENT_CRASHED,
@@ -31,7 +32,6 @@ from leaderboard.running.messages import Lost
 from leaderboard.running.runner import evaluate
 from leaderboard.running.wall_clock import Limits
 from leaderboard.running.workers.local_engine import LocalEngine
-from leaderboard.scoring.rules import CARLA_1_0
 
 MISBEHAVING = Path(__file__).parents[1] / "misbehaving.py"
 TOY = load_suite("toy")
@@ -195,10 +195,11 @@ def test_a_run_says_what_a_rerun_needs(tmp_path):
     run = evaluated(RunSpec(agent="constant", options=QUIET), [0], tmp_path)
     assert (run.suite, run.suite_version) == (TOY.name, TOY.version)
     assert run.cpu == cpu_capability()
-    assert {"python", "driveinsight", "numpy", "numba"} <= run.versions.keys()
+    assert {"python", "driveinsight", "world", "numpy", "numba"} <= run.versions.keys()
     assert run.track == "PROMPT"
     assert run.options["route_ids"] == [ROUTE]
-    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash, run.agent_hash))
+    assert all(len(text) >= 16 for text in (run.town_hash, run.routes_hash))
+    assert run.agent_version == "constant 1"
     assert sorted(os.listdir(tmp_path)) == ["driveinsight.json", "results.json", "routes"]
 
 

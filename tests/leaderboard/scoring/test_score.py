@@ -16,8 +16,8 @@ from hypothesis.strategies import (
     sampled_from,
 )
 
+from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1, RULES
 from di_envs.world.state import EventKind
-from leaderboard.scoring.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1, RULES
 from leaderboard.scoring.score import (
     Progress,
     Score,

@@ -32,3 +32,11 @@ def test_quantiles_are_those_of_the_printed_tables(degrees, printed):
 def test_no_values_are_refused():
     with pytest.raises(ValueError, match="at least one"):
         mean_interval([])
+
+
+def test_quantiles_are_scipys():
+    stats = pytest.importorskip("scipy.stats")
+    for degrees in (1, 2, 3, 8, 26, 99):
+        for probability in (0.5, 0.8, 0.975, 0.9988, 0.99999):
+            theirs = stats.t.ppf(probability, degrees)
+            assert t_quantile(degrees, probability) == pytest.approx(theirs, rel=1e-6, abs=1e-9)

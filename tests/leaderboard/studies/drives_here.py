@@ -13,7 +13,7 @@ from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.messages import Driven, EngineEvent, Ready, Started
 from leaderboard.running.setting_up import scene_of, set_up
 from leaderboard.running.wall_clock import Stopwatch
-from leaderboard.studies.record import Drive, DrivenRow, Study
+from leaderboard.studies.record import DrivenRow, Study, StudyDrive
 from leaderboard.studies.rows import ABLATION_ROWS, BASELINE_ROW, NULL_ROW
 
 FOLLOWER = f"{Path(__file__).parents[1] / 'route_followers.py'}:RouteFollower"
@@ -44,7 +44,7 @@ class HereEngine:
                 yield Driven(job=job, record=driver.drive(job))
 
 
-def drive(route: str = "0", seed: int = 0, ds: float = 90.0, **fields: object) -> Drive:
+def drive(route: str = "0", seed: int = 0, ds: float = 90.0, **fields: object) -> StudyDrive:
     """A drive whose route is complete: its score is its penalty's."""
     values = {
         "route_hash": f"hash of {route}",
@@ -58,10 +58,10 @@ def drive(route: str = "0", seed: int = 0, ds: float = 90.0, **fields: object) -
         "episode": f"{route} {seed} {ds}",
         **fields,
     }
-    return Drive(route_id=route, seed=seed, **values)  # type: ignore[arg-type]
+    return StudyDrive(route_id=route, seed=seed, **values)  # type: ignore[arg-type]
 
 
-def row(name: str, *drives: Drive, left_out: str = "") -> DrivenRow:
+def row(name: str, *drives: StudyDrive, left_out: str = "") -> DrivenRow:
     """A row of an ablation, or the baseline or the null row, with these drives."""
     known = {each.name: each for each in (BASELINE_ROW, NULL_ROW, *ABLATION_ROWS)}
     return DrivenRow(row=known[name], planned=len(drives), drives=drives, left_out=left_out)
@@ -71,7 +71,7 @@ def study(*rows: DrivenRow, **fields: object) -> Study:
     values = {
         "kind": "ablation",
         "agent": "mine.py:Mine",
-        "agent_hash": "ab",
+        "agent_version": "ab",
         "track": "PROMPT",
         "requires": {"observations": ["prompt"]},
         "suite": "town05_short",
@@ -82,7 +82,7 @@ def study(*rows: DrivenRow, **fields: object) -> Study:
         "town_hash": "cd",
         "routes_hash": "ef",
         "interventions": (),
-        "versions": {"python": "3.11"},
+        "versions": {"python": "3.11", "numpy": "2.4.6", "world": "1"},
         "cpu": "generic",
         "seeds": (0,),
         **fields,

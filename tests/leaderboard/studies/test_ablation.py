@@ -9,10 +9,11 @@ from PIL import Image
 from rich.console import Console
 
 from leaderboard.pages.study_files import keep_study, write_ablation
-from leaderboard.studies.ablation import findings, sentences, work_out
+from leaderboard.studies import StudyError
+from leaderboard.studies.ablation import work_out
+from leaderboard.studies.ablation_findings import findings, sentences
 from leaderboard.studies.effects import EQUIVALENT, MATTERS
 from leaderboard.studies.rows import ABLATION_ROWS, choose_rows
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import STUDY_FILE, read_study
 from leaderboard.studies.table_two import TABLE_2
 from leaderboard.tables.ablation_table import ablation_markdown, ablation_tables
@@ -155,10 +156,29 @@ def test_rows_are_chosen_by_row_by_text_or_by_component():
     ("damage", "message"),
     [
         (lambda text: text[: len(text) // 2], "is not whole JSON"),
-        (lambda text: text.replace("driveinsight-study", "other"), "no record of a study"),
-        (lambda text: text.replace('"format_version": 1', '"format_version": 9'), "version 9"),
-        (lambda text: text.replace('"town_hash"', '"town_has"'), "lacks or garbles a field"),
-        (lambda text: text.replace("90.0", '"90"', 1), "driving_score of a drive is no number"),
+        (
+            lambda text: text.replace('"seeds":', '"seeds": ' + "[" * 100_000),
+            "nested deeper than 64",
+        ),
+        (lambda text: text.replace("90.0", "NaN", 1), "NaN is no number of JSON"),
+        (lambda text: text.replace('"name":"baseline"', '"name":"base"'), "every study has one"),
+        (
+            lambda text: text.replace('"planned":', '"plannd":', 1),
+            r"rows\[0\]: unknown field 'plannd'",
+        ),
+        (
+            lambda text: text.replace("driveinsight-study", "other"),
+            "its format is not 'driveinsight-study'",
+        ),
+        (lambda text: text.replace('"format_version": 2', '"format_version": 9'), "version 9"),
+        (
+            lambda text: text.replace('"town_hash"', '"town_has"'),
+            "unknown field 'town_has'; did you mean 'town_hash'",
+        ),
+        (
+            lambda text: text.replace("90.0", '"90"', 1),
+            r"rows\[\d\]\.drives\[\d\]\.driving_score: expected a number, got '90'",
+        ),
     ],
 )
 def test_a_broken_record_is_refused_with_what_to_do(made, tmp_path, damage, message):

@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from di_envs.rules import CARLA_2_1
 from di_envs.world.kinds import EventKind
 from leaderboard.commands.cli import main
 from leaderboard.records.rescoring import rescored
 from leaderboard.records.results import write_run
-from leaderboard.scoring.rules import CARLA_2_1
 from leaderboard.scoring.score import Score
 from leaderboard.studies.comparing import PairingError, compare_runs
 from leaderboard.tables.comparison_table import comparison_tables
@@ -48,9 +48,9 @@ def text_of(comparison) -> str:
 
 def test_the_mean_difference_is_second_less_first_over_pairs():
     comparison = compare_runs(*runs())
-    assert comparison.interval("driving_score").mean == pytest.approx((30.0 + 0.0 + 50.0) / 3)
-    assert comparison.interval("route_completion").mean == pytest.approx(50.0 / 3)
-    assert comparison.interval("infraction_score").mean == pytest.approx(0.1)
+    assert comparison.interval("driving_score").value == pytest.approx((30.0 + 0.0 + 50.0) / 3)
+    assert comparison.interval("route_completion").value == pytest.approx(50.0 / 3)
+    assert comparison.interval("infraction_score").value == pytest.approx(0.1)
 
 
 def test_which_routes_changed_and_by_which_event_is_named():
@@ -91,7 +91,7 @@ def test_a_run_compared_with_itself_has_no_difference():
     before, _ = runs()
     comparison = compare_runs(before, before)
     interval = comparison.interval("driving_score")
-    assert (interval.mean, interval.low, interval.high) == (0.0, 0.0, 0.0)
+    assert (interval.value, interval.low, interval.high) == (0.0, 0.0, 0.0)
     assert comparison.changes() == []
 
 
@@ -113,12 +113,13 @@ def test_lost_routes_and_those_of_one_run_only_are_left_out_and_counted():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"versions": {"python": "3.12"}}, "python 3.11, not 3.12"),
+        ({"versions": {"numpy": "2.3.1", "world": "1"}}, r"numpy 2\.4\.6, not 2\.3\.1"),
+        ({"versions": {"numpy": "2.4.6", "world": "2"}}, "world 1, not 2"),
         ({"cpu": "avx2"}, "CPU generic, not avx2"),
         ({"suite": "town05_short"}, "suite town05_long, not town05_short"),
         ({"suite_version": 2}, "suite_version 1, not 2"),
-        ({"town_hash": "00"}, "town_hash ff, not 00"),
-        ({"options": {"traffic": 4}}, "option traffic 3, not 4"),
+        ({"town_hash": "00"}, "the hash of the town's map ff, not 00"),
+        ({"options": {"traffic": 4}}, "option 'traffic' 3, not 4"),
         ({"rules": "carla-2.0"}, "pass --rules"),
     ],
 )
@@ -126,6 +127,21 @@ def test_runs_of_other_worlds_are_refused(change, message):
     before, after = runs()
     with pytest.raises(PairingError, match=message):
         compare_runs(before, replace(after, **change))
+
+
+def test_another_python_and_what_only_one_driver_rests_on_are_no_obstacle():
+    before, after = runs()
+    other = {**after.versions, "python": "3.12", "driveinsight": "0.2", "torch": "2.13.0"}
+    assert len(compare_runs(before, replace(after, versions=other)).pairs) == 3
+
+
+def test_two_drivers_that_learnt_rest_on_the_same_torch():
+    before, after = (
+        replace(run, versions={**run.versions, "torch": version})
+        for run, version in zip(runs(), ("2.13.0", "2.12.0"), strict=True)
+    )
+    with pytest.raises(PairingError, match=r"torch 2\.13\.0, not 2\.12\.0"):
+        compare_runs(before, after)
 
 
 def test_what_only_the_agent_sees_may_differ():

@@ -16,10 +16,10 @@ from leaderboard.commands.cli import main
 from leaderboard.records.results import read_run
 from leaderboard.replaying.verify import verify_run
 from leaderboard.running.jobs import RunSpec
+from leaderboard.studies import StudyError
 from leaderboard.studies.driving import StudyPlan, drive_study
 from leaderboard.studies.more_seeds import recover_run
 from leaderboard.studies.rows import choose_rows
-from leaderboard.studies.study_error import StudyError
 from leaderboard.studies.study_file import read_study, write_study
 from tests.leaderboard.studies.drives_here import FOLLOWER, HereEngine
 

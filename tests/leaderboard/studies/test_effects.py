@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists
@@ -16,7 +15,6 @@ from leaderboard.studies.effects import (
     UNDECIDED,
     effect,
     share_effect,
-    spearman,
 )
 
 HUNDRED = [str(number) for number in range(100)]
@@ -107,25 +105,3 @@ def test_more_rows_widen_the_interval_and_never_make_a_verdict_surer(differences
     assert among.high >= alone.high >= alone.inner_high - 1e-9
     if alone.verdict == UNDECIDED:
         assert among.verdict == UNDECIDED
-
-
-def test_rank_correlation_by_hand():
-    """Ranks 1 2 3 4 against 1 2 4 3: 1 - 6 * 2 / (4 * 15) = 0.8."""
-    assert spearman([10.0, 20.0, 30.0, 40.0], [1.0, 2.0, 9.0, 3.0]) == pytest.approx(0.8)
-    assert spearman([1.0, 2.0, 3.0], [30.0, 20.0, 10.0]) == pytest.approx(-1.0)
-    assert spearman([1.0, 2.0], [1.0, 2.0]) is None
-    assert spearman([1.0, 1.0, 1.0], [1.0, 2.0, 3.0]) is None
-    with pytest.raises(ValueError, match="not of 1 and 2"):
-        spearman([1.0], [1.0, 2.0])
-
-
-def test_rank_correlation_with_ties_and_quantiles_of_t_are_scipys():
-    stats = pytest.importorskip("scipy.stats")
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        one, two = rng.integers(0, 5, (2, 9))
-        assert spearman(one, two) == pytest.approx(stats.spearmanr(one, two).statistic)
-    for degrees in (1, 2, 3, 8, 26, 99):
-        for probability in (0.5, 0.8, 0.975, 0.9988, 0.99999):
-            theirs = stats.t.ppf(probability, degrees)
-            assert t_quantile(degrees, probability) == pytest.approx(theirs, rel=1e-6, abs=1e-9)

@@ -21,6 +21,8 @@ from leaderboard.commands.cli import main
 from leaderboard.pages.prompt_pictures import write_prompt_picture
 from leaderboard.records.results import write_run
 from leaderboard.replaying.replay import replay_env
+from leaderboard.statistics.claim_verdict import ClaimVerdict
+from leaderboard.studies import StudyError
 from leaderboard.studies.approaches import (
     GREEN_SHOWN,
     RED_SHOWN,
@@ -30,14 +32,13 @@ from leaderboard.studies.approaches import (
     judge_lights,
     ran_red,
 )
-from leaderboard.studies.experiments import EXPERIMENTS, Verdict, choose_experiments
+from leaderboard.studies.experiments import EXPERIMENTS, choose_experiments
 from leaderboard.studies.failures import has_failed, judge_bev, judge_map
 from leaderboard.studies.lateral import judge_route, lateral_offsets
 from leaderboard.studies.prompt_editing import finding_sentence
 from leaderboard.studies.record import DrivenRow
 from leaderboard.studies.route_place import RoutePlace, offsets
 from leaderboard.studies.speed_sweep import DOSES_MPS, judge_speed, path_length, sweep
-from leaderboard.studies.study_error import StudyError
 from tests.leaderboard.made_records import route, run_of
 from tests.leaderboard.short_drives import short_run
 from tests.leaderboard.studies.drives_here import FOLLOWER, drive, row, study
@@ -121,10 +122,10 @@ def test_a_drive_that_ended_at_once_says_nothing():
 @pytest.mark.parametrize(
     ("shares", "verdict"),
     [
-        ((0.1, 0.0, 0.9), Verdict.HOLDS),
-        ((0.9, 0.0, 0.9), Verdict.DOES_NOT_HOLD),  # routing alone is enough
-        ((0.1, 0.0, 0.2), Verdict.DOES_NOT_HOLD),  # both together are not
-        ((0.495, 0.0, 0.9), Verdict.UNDECIDED),
+        ((0.1, 0.0, 0.9), ClaimVerdict.HOLDS),
+        ((0.9, 0.0, 0.9), ClaimVerdict.DOES_NOT_HOLD),  # routing alone is enough
+        ((0.1, 0.0, 0.2), ClaimVerdict.DOES_NOT_HOLD),  # both together are not
+        ((0.495, 0.0, 0.9), ClaimVerdict.UNDECIDED),
     ],
 )
 def test_the_route_experiment_asks_who_takes_the_ego_along(shares, verdict, tmp_path):
@@ -160,18 +161,18 @@ def test_the_lights_experiment_counts_shares_of_approaches(tmp_path):
         GREEN_SHOWN: seen("red", crossed=True),
     }
     judgement = judge_lights(led)
-    assert judgement.verdict == Verdict.HOLDS
+    assert judgement.verdict == ClaimVerdict.HOLDS
     assert "the ego stands before 100 % of 12" in judgement.sentence
     assert "(unedited: 0 % of 12)" in judgement.sentence
     assert finding_sentence(judgement).startswith("The paper's finding holds here: green lights")
     stubborn = judge_lights({**led, RED_SHOWN: seen("green", crossed=True)})
-    assert stubborn.verdict == Verdict.DOES_NOT_HOLD
+    assert stubborn.verdict == ClaimVerdict.DOES_NOT_HOLD
     assert judge_lights({"": []}) is None
     three = {
         RED_SHOWN: seen("green", held=True, count=3),
         GREEN_SHOWN: seen("red", crossed=True, count=3),
     }
-    assert judge_lights(three).verdict == Verdict.UNDECIDED  # three of three may be chance
+    assert judge_lights(three).verdict == ClaimVerdict.UNDECIDED  # three of three may be chance
     assert write_prompt_picture(tmp_path / "lights.png", judgement)
     with Image.open(tmp_path / "lights.png") as image:
         assert image.width > 500
@@ -200,20 +201,20 @@ def test_failures_are_counted_once_a_drive():
 
 def test_the_map_experiment_asks_whether_more_drives_fail(tmp_path):
     calm = judge_map(edited_study("map", {}))
-    assert calm.verdict == Verdict.HOLDS
-    assert judge_map(edited_study("map", {"red_light": 1})).verdict == Verdict.HOLDS
+    assert calm.verdict == ClaimVerdict.HOLDS
+    assert judge_map(edited_study("map", {"red_light": 1})).verdict == ClaimVerdict.HOLDS
     few = judge_map(edited_study("map", {}, HASHES))
-    assert few.verdict == Verdict.UNDECIDED  # on 12 routes chance can hide one drive in three
+    assert few.verdict == ClaimVerdict.UNDECIDED  # on 12 routes chance can hide one drive in three
     lost = judge_map(edited_study("map", {"route_deviation": 1}))
-    assert lost.verdict == Verdict.DOES_NOT_HOLD
+    assert lost.verdict == ClaimVerdict.DOES_NOT_HOLD
     assert "wrong lane or off road +100 %" in lost.sentence
     assert judge_map(edited_study("bev", {})) is None
     assert write_prompt_picture(tmp_path / "map.png", lost)
 
 
 def test_the_bev_experiment_is_the_other_way_round():
-    assert judge_bev(edited_study("bev", {"collision_static": 1})).verdict == Verdict.HOLDS
-    assert judge_bev(edited_study("bev", {})).verdict == Verdict.DOES_NOT_HOLD
+    assert judge_bev(edited_study("bev", {"collision_static": 1})).verdict == ClaimVerdict.HOLDS
+    assert judge_bev(edited_study("bev", {})).verdict == ClaimVerdict.DOES_NOT_HOLD
 
 
 def asked(slope):
@@ -232,10 +233,10 @@ def asked(slope):
 
 def test_the_speed_experiment_compares_paths_at_0_and_10_metres_per_second(tmp_path):
     judgement = judge_speed(asked(2.0))
-    assert judgement.verdict == Verdict.HOLDS
+    assert judgement.verdict == ClaimVerdict.HOLDS
     assert judgement.numbers["gains"]["speed"]["mean"] == pytest.approx(20.0)
     assert judgement.numbers["curves"]["speed"]["mean"][0] == pytest.approx(4.05)
-    assert judge_speed(asked(0.1)).verdict == Verdict.DOES_NOT_HOLD  # 1 m of 24
+    assert judge_speed(asked(0.1)).verdict == ClaimVerdict.DOES_NOT_HOLD  # 1 m of 24
     assert judge_speed([]) is None
     assert write_prompt_picture(tmp_path / "speed.png", judgement)
 
@@ -260,6 +261,16 @@ def test_an_agent_that_knows_no_lights_drives_over_the_red_ones_that_it_meets():
     reds = sum(each.colour == "red" and each.crossed for each in found)
     events = sum(event.kind.name == "RED_LIGHT" for event in run.routes[0].events)
     assert reds <= events <= reds + sum(not each.crossed for each in found)
+
+
+def test_a_light_that_was_yellow_as_the_ego_drove_over_it_is_a_red_one_that_it_met():
+    """No infraction, as yellow is free; yet whoever is shown green there is led by it."""
+    run = short_run("expert-redrunner", 120, route_id="2", seed=1, traffic=2, walkers=1)
+    assert not any(event.kind.name == "RED_LIGHT" for event in run.routes[0].events)
+    env = replay_env(run)
+    found = [(each.colour, each.crossed) for each in approaches(run, run.routes[0], env)]
+    assert found == [("green", False), ("red", True)]
+    env.close()
 
 
 @pytest.fixture(scope="module")

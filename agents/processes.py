@@ -1,0 +1,141 @@
+"""Work in processes of this machine: fresh ones, that leave Ctrl-C to their parent and end with it.
+
+Whoever spreads work over processes does it here, so that one rule holds for all. A child is born
+with Ctrl-C blocked, and watches its parent: one that is killed, even by a signal that nobody can
+catch, leaves no child behind. This lies in `agents`, the lowest room that starts processes; the
+leaderboard's workers and pools use it from above.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing.connection import wait
+from typing import Any, Protocol, TypeVar
+
+FRESH = multiprocessing.get_context("spawn")  # how they begin: with nothing of their parent's
+
+J = TypeVar("J")
+R = TypeVar("R")
+Given = TypeVar("Given", covariant=True)
+
+
+class Pending(Protocol[Given]):
+    """A job that is on its way, as `concurrent.futures.Future` has it."""
+
+    def result(self) -> Given: ...
+    def cancel(self) -> bool: ...
+
+
+class Pool(Protocol[J, R]):
+    """Whatever does jobs at the same time: processes here, or a cluster."""
+
+    def submit(self, work: Callable[[J], R], job: J, /) -> Pending[R]: ...
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Pool[Any, Any]]:
+    """A pool of so many processes of this machine, which start as there is work for them."""
+    with ProcessPoolExecutor(workers, FRESH, live_for_parent) as executor:
+        yield _Processes(executor)
+
+
+class _Processes:
+    """An executor whose children are born with Ctrl-C blocked."""
+
+    def __init__(self, executor: ProcessPoolExecutor) -> None:
+        self._executor = executor
+
+    def submit(self, work: Callable[[J], R], job: J, /) -> Pending[R]:
+        with ctrl_c_blocked():
+            return self._executor.submit(work, job)
+
+
+def in_order(
+    pool: Pool[J, R],
+    work: Callable[[J], R],
+    jobs: Iterable[J],
+    *,
+    ahead: int,
+    in_vain: Callable[[R], None] | None = None,
+) -> Generator[R, None, None]:
+    """Does jobs at the same time; yields what comes of them in their own order.
+
+    It may be left at any time (`close`): what has not begun then is never done.
+
+    Args:
+        pool: Where.
+        work: What is done with a job: a function of a module, as processes find it by its name.
+        jobs: Asked for one more whenever one has been yielded; there may be no end to them.
+        ahead: How many are under way at most, counting the one that is waited for.
+        in_vain: Told the results that nobody waited for when this was left, to undo them. What
+            went wrong in such a job is passed over: with one process it would not have begun.
+
+    Raises:
+        ChildProcessError: If a process died.
+        Exception: What a job raised, with the trace of its process as the cause.
+    """
+    left = iter(jobs)
+    under_way = deque(pool.submit(work, job) for job in islice(left, ahead))
+    try:
+        while under_way:
+            yield _result(under_way.popleft())
+            under_way.extend(pool.submit(work, job) for job in islice(left, 1))
+    finally:
+        begun = [pending for pending in under_way if not pending.cancel()]
+        if in_vain is not None:
+            for result in _results(begun):
+                in_vain(result)
+
+
+def _results(begun: Iterable[Pending[R]]) -> Iterator[R]:
+    """Those of the jobs that went well."""
+    for pending in begun:
+        try:
+            result = _result(pending)
+        except Exception:
+            continue
+        yield result
+
+
+def _result(pending: Pending[R]) -> R:
+    try:
+        return pending.result()
+    except BrokenProcessPool as error:
+        raise ChildProcessError(
+            "a process that worked for this one died: it was killed, or there was no memory left; "
+            "with fewer --workers each has more"
+        ) from error
+
+
+@contextmanager
+def ctrl_c_blocked() -> Iterator[None]:
+    """Processes born within never die of Ctrl-C, not even while they load."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def live_for_parent() -> None:
+    """In a child: leaves Ctrl-C to the parent, and has the child end when the parent does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    sentinel = parent.sentinel
+
+    def watch() -> None:
+        wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

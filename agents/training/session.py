@@ -1,0 +1,171 @@
+"""From what is asked for to a training that can begin: its data, device, team, weights, samples.
+
+A session goes on where its folder's checkpoint ends; else it begins with fresh weights, or with
+those of another policy.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from agents.driveinsight.config import PolicyConfig
+from agents.driveinsight.weights import take_weights, weights_digest
+from agents.training.collect import data_card
+from agents.training.config import TrainConfig, TrainingError
+from agents.training.distributed import Team, joined_team
+from agents.training.learning import Training
+from agents.training.loading import Moments, Samples, batches, load_moments
+from agents.training.loop import CHECKPOINT_FILE
+from agents.training.samples import Batch
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingPlan:
+    """What is to be trained, on what, and where.
+
+    Attributes:
+        policy: What is trained.
+        training: How; what is known only once it begins (data, team, precision) is filled in then.
+        data: Folders of drives.
+        folder: For all that is written.
+        init_from: A policy to begin with the weights of; None for fresh ones.
+        device: `cpu`, `cuda`, or `auto`: a GPU if there is one.
+        precision: `float32`, `bfloat16`, or `auto`: bfloat16 where the hardware has it built in.
+        workers: Processes that render samples; None for the cores that are left.
+    """
+
+    policy: PolicyConfig
+    training: TrainConfig
+    data: tuple[Path, ...]
+    folder: Path
+    init_from: Path | None = None
+    device: str = "auto"
+    precision: str = "auto"
+    workers: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """A training that can begin or go on.
+
+    Attributes:
+        plan: What was asked for.
+        training: At the step that it goes on from.
+        samples: Of the whole training.
+        resumed: Whether the folder held it.
+        taken: Names of the tensors that are another policy's.
+        left: Names of those of its tensors that fit nowhere.
+    """
+
+    plan: TrainingPlan
+    training: Training
+    samples: Samples
+    resumed: bool
+    taken: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+
+    def batches(self) -> Generator[Batch, None, None]:
+        """What it learns from, from its step on."""
+        team, workers = self.training.team, self.plan.workers
+        return batches(
+            self.samples,
+            first_step=self.training.step,
+            workers=free_cores(team) if workers is None else workers,
+            team=team,
+        )
+
+    def about_data(self) -> Mapping[str, Any]:
+        """The data card of each folder."""
+        return {str(folder): data_card(folder) for folder in self.plan.data}
+
+
+@contextmanager
+def joined(plan: TrainingPlan) -> Iterator[tuple[Team, str]]:
+    """The team that trains, and this process's device; only the first process is heard."""
+    torch.set_num_threads(plan.training.threads)
+    with joined_team(chosen_device(plan.device)) as (team, device), one_talks(team):
+        yield team, device
+
+
+def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
+    """Reads the drives, and the weights that it goes on from or begins with.
+
+    Raises:
+        TrainingError: If there is nothing to learn from, or the folder holds another training.
+        WeightsError: If there is no policy to begin with.
+        DriveFileError: If a drive is not whole.
+    """
+    digest = "" if plan.init_from is None else weights_digest(plan.init_from)
+    moments = load_moments(plan.data, plan.training.standing_share)
+    config = _filled_in(plan, moments, team, device, digest)
+    training = Training.begin(plan.policy, config, device, team)
+    samples = Samples(plan.policy, config, moments)
+    checkpoint = plan.folder / CHECKPOINT_FILE
+    if checkpoint.exists():
+        training.load(checkpoint)
+        return Session(plan=plan, training=training, samples=samples, resumed=True)
+    taken: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+    if plan.init_from is not None:
+        taken, left = map(tuple, take_weights(training.policy, plan.init_from))
+    return Session(
+        plan=plan, training=training, samples=samples, resumed=False, taken=taken, left=left
+    )
+
+
+def _filled_in(
+    plan: TrainingPlan, moments: Moments, team: Team, device: str, weights: str
+) -> TrainConfig:
+    """The configuration with what only now is known: it decides what comes out, too."""
+    learns_all = not plan.training.overfit and moments.drives > 1  # a single one is for learning
+    try:
+        return replace(
+            plan.training,
+            precision=chosen_precision(plan.precision, device),
+            processes=team.size,
+            held_out=plan.training.held_out if learns_all else 0.0,
+            data=moments.digest,
+            init_from=weights,
+        )
+    except ValueError as error:
+        raise TrainingError(str(error)) from error
+
+
+def chosen_device(name: str) -> str:
+    """`cpu` or `cuda`; `auto` takes a GPU if there is one."""
+    if name != "auto":
+        return name
+    return "cuda" if torch.cuda.is_available() else "cpu"
+
+
+def chosen_precision(name: str, device: str) -> str:
+    """`float32` or `bfloat16`; `auto` takes what the device has built in."""
+    if name != "auto":
+        return name
+    if device.startswith("cuda"):
+        fast = torch.cuda.is_bf16_supported(including_emulation=False)
+    else:
+        fast = torch.cpu.get_capabilities().get("amx_bf16", False)
+    return "bfloat16" if fast else "float32"
+
+
+def free_cores(team: Team) -> int:
+    """Each process's part of the cores that are left when each has one; one at least."""
+    return max((os.cpu_count() or 2) // team.here - 1, 1)
+
+
+@contextmanager
+def one_talks(team: Team) -> Iterator[None]:
+    """Of a team only the first process is heard, but for errors."""
+    if team.first:
+        yield
+        return
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        yield

@@ -1,0 +1,77 @@
+"""Which driver it is, and on which packages it rests: what results of two days are compared by.
+
+Our own drivers declare a version, so that an edit of their text moves nothing; `tests/golden` says
+when one must be raised. Weights and other people's code are told by a hash of their files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from agents import AGENTS, SCHEMES, AgentEntry, place_and_options
+
+
+def agent_version(spec: str) -> str:
+    """What tells the agent of a specification from others of the same name.
+
+    `expert 1` for one of ours; `driveinsight 1, files 3f…` for one that reads files, with a hash of
+    what they hold; `file 3f…` for code of others, with a hash of the file that its class is in.
+
+    Args:
+        spec: See `agents.load_agent`, which must be able to load it.
+    """
+    if spec in AGENTS:
+        entry = AGENTS[spec]
+        own = Path(__file__).parent / entry.data
+        return _declared(spec, entry, [own] if entry.data else [])
+    scheme, _, place = spec.partition(":")
+    if scheme in SCHEMES:
+        path, options = place_and_options(spec, place)
+        return _declared(scheme, SCHEMES[scheme], [Path(p) for p in (path, *options.values())])
+    return f"file {_hash([_code_of(spec.rpartition(':')[0])])}"
+
+
+def agent_packages(spec: str) -> tuple[str, ...]:
+    """Packages whose version can change a bit of what the agent does, beside the world's own."""
+    entry = AGENTS.get(spec) or SCHEMES.get(spec.partition(":")[0])
+    return entry.packages if entry is not None else OF_OTHERS
+
+
+# Code of others may load any of these, and does not say so
+OF_OTHERS = SCHEMES["carla"].packages
+
+
+def _declared(name: str, entry: AgentEntry, places: Sequence[Path]) -> str:
+    files = [file for place in places for file in _files(place, entry)]
+    return f"{name} {entry.version}" + (f", files {_hash(files)}" if files else "")
+
+
+def _files(place: Path, entry: AgentEntry) -> list[Path]:
+    """A file; or those of a folder that decide what the agent does; none where there is neither."""
+    if place.is_dir():
+        named = [place / name for name in entry.data_files] or sorted(place.iterdir())
+        return [path for path in named if path.is_file()]
+    return [place] if place.is_file() else []
+
+
+def _code_of(place: str) -> Path:
+    """The file of a module, or the file itself."""
+    if place.endswith(".py"):
+        return Path(place)
+    loaded = getattr(sys.modules.get(place), "__file__", None)
+    spec = None if loaded else importlib.util.find_spec(place)
+    found = loaded or (spec.origin if spec else None)
+    if found is None:
+        raise FileNotFoundError(f"there is no file of the module '{place}' to tell it by")
+    return Path(found)
+
+
+def _hash(files: Sequence[Path]) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+    for file in files:
+        digest.update(hashlib.blake2b(file.read_bytes()).digest())  # their lengths are told, too
+    return digest.hexdigest()

@@ -1,0 +1,1 @@
+"""What every file of ours goes through: typed JSON, whole-file writes, numbers as short text."""
