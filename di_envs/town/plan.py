@@ -58,6 +58,7 @@ class RoutePlan:
         0.0,
         0.0,
     )  # of the town: latitude, longitude [deg] of x = y = 0
+    remarks: tuple[str, ...] = ()  # what is odd about it, a sentence each
 
     @property
     def length_m(self) -> float:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from di_envs.town.lanes import LaneKind, Lanes
 from di_envs.town.plan import RoadOption
+from di_envs.town.routing.carla_roads import CarlaRoads, Place, away_m
 from di_envs.town.routing.pieces import Piece, cut_lanes
 from di_envs.town.routing.snapping import Chords, Snap, lay_chords, snap_to_lane
 from di_envs.town.routing.traces import (
@@ -29,12 +30,15 @@ from di_envs.town.routing.traces import (
     join_traces,
     lay_ruler,
     places_by_road,
+    rows_of,
     successors_of,
     walk_beyond,
 )
 from di_envs.town.town import Town
 
 STEP_M = 1.0  # between route points, along the road's reference line
+INSIDE_M = 1e-9  # of a piece, from its begin
+TIE_M = 1e-3  # nearer to a step than that, single precision decides
 
 _CHANGE_LEFT, _CHANGE_RIGHT = 1, 2  # bits of Lanes.change
 
@@ -120,7 +124,8 @@ def build_road_graph(town: Town) -> RoadGraph:
             "check the lane types in its OpenDRIVE file."
         )
     pieces, ruler = cut_lanes(town), lay_ruler(town.lanes)
-    builder = _Builder(town.lanes, pieces, ruler)
+    roads = CarlaRoads(town.opendrive)
+    builder = _Builder(town, roads, pieces, ruler)
     for piece in range(len(pieces)):
         builder.follow(piece)
     for piece in range(len(pieces)):
@@ -131,23 +136,27 @@ def build_road_graph(town: Town) -> RoadGraph:
         edges=tuple(builder.edges),
         piece_edge=builder.piece_edge,
         ruler=ruler,
-        chords=lay_chords(town.lanes, ruler, pieces),
+        chords=lay_chords(town, ruler, pieces, roads),
     )
 
 
 class _Builder:
     """The graph while it grows; the order of insertion is part of the result."""
 
-    def __init__(self, lanes: Lanes, pieces: list[Piece], ruler: Ruler) -> None:
-        self.lanes = lanes
+    def __init__(self, town: Town, roads: CarlaRoads, pieces: list[Piece], ruler: Ruler) -> None:
+        self.town = town
+        self.lanes = lanes = town.lanes
         self.pieces = pieces
         self.ruler = ruler
+        self.carla = roads
         self.steps = _steps_of(lanes, pieces, ruler)
         self.nodes: dict[tuple[float, float, float], int] = {}
         self.edges: list[dict[int, Edge]] = []
         self.piece_edge: dict[int, tuple[int, int]] = {}
         self.between: dict[int, list[Trace]] = {}
-        self.by_section = {(piece.lane, piece.section): i for i, piece in enumerate(pieces)}
+        self.of_lane: dict[int, list[int]] = {}
+        for i, piece in enumerate(pieces):
+            self.of_lane.setdefault(piece.lane, []).append(i)
         self.first_of_lane = {
             piece.lane: i for i, piece in enumerate(pieces) if piece.begin_m == 0.0
         }
@@ -157,9 +166,9 @@ class _Builder:
         """Adds an edge along a piece to each of those ahead, or to its own end."""
         along, ahead = self.steps[index], self._ahead(self.pieces[index])
         for exit_piece in ahead:
-            self._add(index, exit_piece, along, self.steps[exit_piece].part(slice(0, 1)))
+            self._add(index, exit_piece, self._middle(index, exit_piece))
         if not ahead and len(along.lane) > 2:
-            self._add(index, index, along, along.part(slice(-1, None)))
+            self._add(index, index, along.part(slice(1, -1)))
 
     def _ahead(self, piece: Piece) -> list[int]:
         """The pieces that a piece leads into."""
@@ -168,9 +177,9 @@ class _Builder:
             return [following]
         return [self.first_of_lane[lane] for lane in successors_of(self.lanes, piece.lane)]
 
-    def _add(self, index: int, exit_piece: int, along: Trace, end: Trace) -> None:
-        piece, begin = self.pieces[index], along.part(slice(0, 1))
-        middle = self._middle(piece, along, end)
+    def _add(self, index: int, exit_piece: int, middle: Trace) -> None:
+        piece, begin = self.pieces[index], self.steps[index].part(slice(0, 1))
+        end = self.steps[exit_piece].part(slice(-1, None) if exit_piece == index else slice(0, 1))
         source, target = self._node_at(begin.points[0, :3]), self._node_at(end.points[0, :3])
         self.piece_edge[index] = (source, target)
         self.between.setdefault(index, []).append(middle)
@@ -191,19 +200,38 @@ class _Builder:
             trace=join_traces([begin, middle, end]),
         )
 
-    def _middle(self, piece: Piece, along: Trace, end: Trace) -> Trace:
+    def _middle(self, index: int, exit_piece: int) -> Trace:
         """The points between: steps of 1 m until the end is at most 1 m away.
 
         A piece shorter than a step gets one point all the same, beyond its end, as in CARLA.
         """
-        away_m = np.linalg.norm(along.points[:-1, :3] - end.points[0, :3], axis=1)
-        if away_m[0] <= STEP_M:
+        piece, along = self.pieces[index], self.steps[index]
+        end = self.steps[exit_piece].points[0, :3]
+        away = np.linalg.norm(along.points[:-1, :3] - end, axis=1)
+        for step in np.flatnonzero(np.abs(away - STEP_M) < TIE_M):
+            away[step] = self._settled(index, int(step), exit_piece, float(away[step]))
+        if away[0] <= STEP_M:
             lane, road_m = walk_beyond(self.lanes, piece.lane, piece.begin_m + STEP_M)
             return places_by_road(
                 self.lanes, self.ruler, np.array([lane], np.int32), np.array([road_m])
             )
-        near = np.flatnonzero(away_m <= STEP_M)
-        return along.part(slice(1, int(near[0]) if len(near) else len(away_m)))
+        near = np.flatnonzero(away <= STEP_M)
+        return along.part(slice(1, int(near[0]) if len(near) else len(away)))
+
+    def _settled(self, index: int, step: int, exit_piece: int, about_m: float) -> float:
+        """How far a step of a piece is from the end, as CARLA's single precision has it."""
+        here = self._carlas_place(index, step)
+        there = self._carlas_place(exit_piece, 0)
+        return about_m if here is None or there is None else float(away_m(here, there))
+
+    def _carlas_place(self, index: int, step: int) -> Place | None:
+        piece, lanes = self.pieces[index], self.lanes
+        rows = rows_of(lanes, piece.lane)
+        begin, end = float(lanes.road_m[rows.start]), float(lanes.road_m[rows.stop - 1])
+        # a little inside, as in CARLA: where two curves join, the one ahead says where the point is
+        station_m = begin + math.copysign(piece.begin_m + step * STEP_M + INSIDE_M, end - begin)
+        road = self.town.road_names[lanes.road[piece.lane]]
+        return self.carla.place(road, station_m, self.steps[index].points[step])
 
     def _node_at(self, position: NDArray[np.float64]) -> int:
         x, y, z = (np.round(position, 0) + 0.0).tolist()  # + 0.0 makes one zero of -0.0 and 0.0
@@ -213,22 +241,35 @@ class _Builder:
         return node
 
     def change(self, index: int) -> None:
-        """Adds the lane changes that the piece's markings allow, in the order they come up."""
-        lanes, piece = self.lanes, self.pieces[index]
-        if lanes.junction[piece.lane] >= 0:
+        """Adds the lane changes that the markings along a piece allow, in the order they come up.
+
+        A change goes beside the point whose marking allows it. That of a piece shorter than a step
+        lies beyond it, on another piece or another road.
+        """
+        lanes = self.lanes
+        if lanes.junction[self.pieces[index].lane] >= 0:
             return
-        sides = (
-            (_CHANGE_RIGHT, RoadOption.CHANGELANERIGHT, int(lanes.right[piece.lane])),
-            (_CHANGE_LEFT, RoadOption.CHANGELANELEFT, int(lanes.left[piece.lane])),
-        )
         for steps in self.between.get(index, []):
             found: set[RoadOption] = set()
-            for allowed in lanes.change[_points_at(lanes, steps)].tolist():
-                for bit, option, lane in sides:
-                    beside = self.by_section.get((lane, piece.section))
-                    if allowed & bit and option not in found and beside in self.piece_edge:
-                        found.add(option)
-                        self._add_change(index, beside, option)
+            for row, place in zip(_points_at(lanes, steps), range(len(steps.lane)), strict=True):
+                lane, allowed = int(steps.lane[place]), int(lanes.change[row])
+                for bit, option, beside in (
+                    (_CHANGE_RIGHT, RoadOption.CHANGELANERIGHT, int(lanes.right[lane])),
+                    (_CHANGE_LEFT, RoadOption.CHANGELANELEFT, int(lanes.left[lane])),
+                ):
+                    if allowed & bit and option not in found and beside >= 0:
+                        entered = self._piece_at(beside, float(lanes.road_m[row]))
+                        if entered in self.piece_edge:
+                            found.add(option)
+                            self._add_change(index, entered, option)
+
+    def _piece_at(self, lane: int, station_m: float) -> int:
+        """The piece of a lane at a station of its road; -1 where there is none."""
+        road_m = abs(station_m - float(self.lanes.road_m[rows_of(self.lanes, lane)][0]))
+        for index in self.of_lane.get(lane, []):
+            if road_m <= self.pieces[index].end_m:
+                return index
+        return self.of_lane.get(lane, [-1])[-1]
 
     def _add_change(self, index: int, beside: int, option: RoadOption) -> None:
         source, target = self.piece_edge[index][0], self.piece_edge[beside][0]

@@ -1,8 +1,13 @@
-"""Plans dense routes between keypoints, equal to what the CARLA Leaderboard makes of them.
+"""Plans dense routes between keypoints, as the CARLA Leaderboard does.
 
 Keypoints are joined two by two with CARLA's global planner at 1 m, and the pieces laid end to end:
 the points follow lane centres, jump sideways at a lane change, and may step back a little where
 two pieces meet. Target points are thinned out by the 50 m rule of Leaderboard 1.0.
+
+Points, options and lengths are CARLA's own, to a few centimetres, wherever a keypoint has one
+nearest lane. Where several lanes are equally near (connectors that begin at one point, the end of a
+lane and the beginning of the next) CARLA takes whichever its search tree happens to visit first;
+here it is the first in the order of CARLA's lanes.
 
 Source: behaviour of `agents/navigation/global_route_planner.py` (CARLA Python API, MIT licence) and
 of `leaderboard/utils/route_manipulation.py` (CARLA Leaderboard 1.0, MIT licence); our own code.
@@ -10,6 +15,7 @@ of `leaderboard/utils/route_manipulation.py` (CARLA Leaderboard 1.0, MIT licence
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -21,11 +27,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from di_envs.town.plan import RoadOption, RoutePlan
 from di_envs.town.routing.crossings import name_connectors
+from di_envs.town.routing.remarks import remarks_on, text_of
 from di_envs.town.routing.road_graph import STEP_M, Edge, RoadGraph, build_road_graph
 from di_envs.town.routing.snapping import Snap
 from di_envs.town.routing.traces import Trace, join_traces
 from di_envs.town.town import Town
 
+LEAST_M = 1.0  # of a route
 MAX_SNAP_M = 60.0  # the official Town05 Short keypoints lie up to 58 m from a lane
 TARGET_SPACING_M = 50.0  # Leaderboard 1.0
 STRAIGHT_BELOW_RAD = math.radians(35.0)  # a smaller change of direction is no turn
@@ -63,8 +71,8 @@ def plan_route(
         The plan, its arrays read-only.
 
     Raises:
-        RouteError: If keypoints are missing, not finite or too far from any driving lane, or if no
-            way leads from one to the next.
+        RouteError: If keypoints are missing, not finite or too far from any driving lane, if no
+            way leads from one to the next, or if the whole is no way at all.
         ValueError: If `graph` was built of another town.
     """
     graph = build_road_graph(town) if graph is None else graph
@@ -84,7 +92,15 @@ def plan_route(
         pieces.append(laid.trace)
         options.extend(laid.options)
     trace = name_connectors(town.lanes, join_traces(pieces))
-    return _plan_of(town, route_id, places, trace, np.array(options, np.int8))
+    plan = _plan_of(town, route_id, places, trace, np.array(options, np.int8))
+    if plan.length_m < LEAST_M:
+        raise RouteError(
+            f"Route '{route_id}' is {plan.length_m:.1f} m long, from {text_of(places[0])} to "
+            f"{text_of(places[-1])}: nothing is left to drive. Move the keypoints apart, in the "
+            "direction of travel of their lane."
+        )
+    remarks = remarks_on(places, snaps, [piece.points for piece in pieces])
+    return dataclasses.replace(plan, remarks=remarks)
 
 
 def target_indices(
@@ -169,16 +185,16 @@ def _checked_snaps(
     for i, snap in enumerate(snaps):
         if snap.distance_m > max_snap_m:
             raise RouteError(
-                f"Route '{route_id}': keypoint {i} at {_text(places[i])} is "
+                f"Route '{route_id}': keypoint {i} at {text_of(places[i])} is "
                 f"{snap.distance_m:.1f} m from the nearest driving lane of town "
                 f"'{graph.town.name}'; at most {max_snap_m:g} m is allowed. The nearest place on a "
-                f"lane is {_text(snap.place.points[0])}: move the keypoint, or check that the "
+                f"lane is {text_of(snap.place.points[0])}: move the keypoint, or check that the "
                 "route was written for this town."
             )
         if snap.piece not in graph.piece_edge:
             raise RouteError(
-                f"Route '{route_id}': keypoint {i} at {_text(places[i])} lies on a lane that leads "
-                "nowhere; move it to another lane."
+                f"Route '{route_id}': keypoint {i} at {text_of(places[i])} lies on a lane that "
+                "leads nowhere; move it to another lane."
             )
     return snaps
 
@@ -349,12 +365,7 @@ def _read_only(array: Array) -> Array:
     return array
 
 
-def _text(position: NDArray[np.float64]) -> str:
-    x, y, z = position[:3]
-    return f"({x:.1f}, {y:.1f}, {z:.1f})"
-
-
 def _lane_text(graph: RoadGraph, snap: Snap) -> str:
     lanes = graph.town.lanes
     road = graph.town.road_names[lanes.road[snap.lane]]
-    return f"road {road} lane {lanes.lane_id[snap.lane]} at {_text(snap.place.points[0])}"
+    return f"road {road} lane {lanes.lane_id[snap.lane]} at {text_of(snap.place.points[0])}"

@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import Lanes
+from di_envs.town.routing.carla_roads import CarlaRoads
 from di_envs.town.routing.pieces import Piece
-from di_envs.town.routing.traces import Ruler, Trace, places_by_road
+from di_envs.town.routing.traces import Ruler, Trace, places_by_road, rows_of
+from di_envs.town.town import Town
 
 SCAN_M = 1.0  # along the reference line
 MAX_CHORD_M = 100.0
@@ -47,15 +49,17 @@ class Snap(NamedTuple):
     distance_m: float  # from the point, in three dimensions
 
 
-def lay_chords(lanes: Lanes, ruler: Ruler, pieces: Sequence[Piece]) -> Chords:
+def lay_chords(town: Town, ruler: Ruler, pieces: Sequence[Piece], roads: CarlaRoads) -> Chords:
     """Lays chords along pieces of lanes, in their order."""
+    lanes = town.lanes
     scans = [np.append(np.arange(p.begin_m, p.end_m, SCAN_M), p.end_m) for p in pieces]
     counts = np.array([len(scan) for scan in scans])
     owner = np.repeat(np.arange(len(pieces), dtype=np.int32), counts)
     scan_m = np.concatenate(scans)
     piece_lane = np.array([piece.lane for piece in pieces], dtype=np.int32)
     points = places_by_road(lanes, ruler, piece_lane[owner], scan_m).points
-    cuts = _cuts(owner, scan_m, _directions(points, scan_m, owner))
+    rise = np.concatenate([_rise(town, roads, p, s) for p, s in zip(pieces, scans, strict=True)])
+    cuts = _cuts(owner, scan_m, _directions(points[:, 3], rise))
     begin, end = cuts[:-1], cuts[1:]
     within = owner[begin] == owner[end]
     begin, end = begin[within], end[within]
@@ -98,19 +102,21 @@ def _share(offset: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np
     return np.clip(along / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
 
 
-def _directions(
-    points: NDArray[np.float64], scan_m: NDArray[np.float64], owner: NDArray[np.int32]
+def _rise(
+    town: Town, roads: CarlaRoads, piece: Piece, scan_m: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(N, 3) unit vectors along the lanes, by yaw and by the slope to the next point."""
-    same = owner[1:] == owner[:-1]
-    rise = np.where(same, np.diff(points[:, 2]), 0.0)
-    slope = np.arctan(rise / np.where(same, np.diff(scan_m), 1.0))
-    # the last point of a piece slopes as the one before it
-    slope = np.append(np.where(same, slope, np.append(0.0, slope[:-1])), slope[-1:])
-    yaw = points[:, 3]
-    return np.stack(
-        [np.cos(slope) * np.cos(yaw), np.cos(slope) * np.sin(yaw), np.sin(slope)], axis=1
-    )
+    """How steeply a piece rises in the direction of travel, along a scan of it."""
+    lanes = town.lanes
+    rows = rows_of(lanes, piece.lane)
+    begin, end = float(lanes.road_m[rows.start]), float(lanes.road_m[rows.stop - 1])
+    sign = 1.0 if end >= begin else -1.0
+    return sign * roads.slopes(town.road_names[lanes.road[piece.lane]], begin + sign * scan_m)
+
+
+def _directions(yaw: NDArray[np.float64], pitch: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) unit vectors by (N,) headings and pitches."""
+    flat = np.cos(pitch)
+    return np.stack([flat * np.cos(yaw), flat * np.sin(yaw), np.sin(pitch)], axis=1)
 
 
 def _cuts(

@@ -284,3 +284,33 @@ def test_lanes_without_a_way_between_them_are_named(tmp_path: Path) -> None:
 def test_a_graph_of_another_town_is_refused(toy: RoadGraph) -> None:
     with pytest.raises(ValueError, match=r"graph was built of town 'toy'.*'town05'"):
         plan_route(load_town("town05"), [(0, 0, 0), (1, 0, 0)], graph=toy)
+
+
+# -- what is odd, and said -------------------------------------------------------------------------
+
+CASES = Path(__file__).parents[2] / "data" / "cases"
+
+
+@pytest.mark.filterwarnings("ignore:.*signal")
+def test_a_lane_change_beside_a_tiny_road_goes_ahead_as_carlas(tmp_path: Path) -> None:
+    town = load_town(CASES / "short_road.xodr", cache_folder=tmp_path)
+    (spec,) = read_routes(CASES / "short_road.xml")
+    plan = plan_route(town, spec.positions)
+    # from (120, 1.75) it goes to the lane beside, five metres on; then to the goal, less 2 m
+    np.testing.assert_allclose(plan.points[:2, :2], [(120.0, 1.75), (125.0, 5.25)], atol=0.01)
+    assert plan.length_m == pytest.approx(49.1, abs=0.1)
+    assert plan.remarks == ()
+
+
+def test_a_route_against_the_lane_is_refused_not_planned_to_no_length(toy: RoadGraph) -> None:
+    # street 11's southern side leads east; half a metre, and a metre back
+    for end in (-59.6, -61.0):
+        with pytest.raises(RouteError, match=r"Route 'r' is 0\.0 m long.*nothing is left to drive"):
+            plan_route(toy.town, [(-60.0, 55.25, 0.0), (end, 55.25, 0.0)], route_id="r", graph=toy)
+
+
+def test_a_keypoint_beside_its_lane_and_too_high_is_named(toy: RoadGraph) -> None:
+    plan = plan_route(toy.town, [(-60.0, 55.25, 0.0), (-20.0, 55.25, 6.0)], graph=toy)
+    (remark,) = [r for r in plan.remarks if "lies" in r]
+    assert "keypoint 1" in remark
+    assert "6.0 m from its lane, 6.0 m too high" in remark
