@@ -124,7 +124,7 @@ def _scenarios(
     if not count:
         return
     if not taken:
-        yield f"The {count} scenarios in the route file are left out: others were asked for."
+        yield f"Scenarios in the route file, left out as --scenarios says otherwise: {count}."
         return
     known = sum(len(placed_on_routes(spec.scenarios)) for spec in specs)
     left_out = sum((types_left_out(spec.scenarios) for spec in specs), Counter[str]())

@@ -195,7 +195,7 @@ def test_none_drives_without_the_scenarios_in_the_route_file(tmp_path: Path) -> 
     found = suite.planned(load_town("toy"))
     assert found.plans[0].scenarios == ()
     assert found.notes == (
-        "The 1 scenarios in the route file are left out: others were asked for.",
+        "Scenarios in the route file, left out as --scenarios says otherwise: 1.",
     )
 
 
