@@ -73,33 +73,31 @@ def plan_routes(
     for spec in specs:
         own = placed_on_routes(spec.scenarios) if own_scenarios else ()
         try:
-            plan = plan_route(
-                graph.town,
-                spec.positions,
-                route_id=spec.route_id,
-                graph=graph,
-                max_snap_m=max_snap_m,
-            )
+            plans.append(_planned(graph, spec, max_snap_m, (*placed, *own)))
         except RouteError as error:
             if strict or len(specs) + len(refused) == 1:
                 raise
             refused[spec.route_id] = str(error)
-            continue
-        plan = dataclasses.replace(plan, weathers=spec.weathers)
-        plans.append(with_scenarios(plan, (*placed, *own)))
     if not plans:
         raise RouteError(f"{file}: no route can be planned.\n" + "\n".join(_reasons(refused)))
     driven = [spec for spec in specs if spec.route_id not in refused]
+    said = (_refusals(refused, len(plans) + len(refused), file), odd_routes(plans, file))
     return PlannedRoutes(
         plans=tuple(plans),
         refused=refused,
-        warnings=tuple(
-            filter(
-                None, (_refusals(refused, len(plans) + len(refused), file), odd_routes(plans, file))
-            )
-        ),
+        warnings=tuple(filter(None, said)),
         notes=(*_scenarios(driven, plans, own_scenarios), *_weathers(driven)),
     )
+
+
+def _planned(
+    graph: RoadGraph, spec: RouteSpec, max_snap_m: float, placed: Sequence[PlacedScenario]
+) -> RoutePlan:
+    """One route with its weathers and the scenarios that it meets."""
+    plan = plan_route(
+        graph.town, spec.positions, route_id=spec.route_id, graph=graph, max_snap_m=max_snap_m
+    )
+    return with_scenarios(dataclasses.replace(plan, weathers=spec.weathers), placed)
 
 
 def _refusals(refused: Mapping[str, str], count: int, file: str) -> str:
