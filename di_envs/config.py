@@ -46,6 +46,7 @@ WEATHERS = (
     "DustStorm",
     "Default",
 )
+ROUTE_WEATHER = "route"  # in place of one: what the route file says
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +67,10 @@ class RouteEnvConfig:
         observations: Groups of observations: `camera`, `lidar`, `prompt`, `inertial`. Each camera
             costs its time, so name what is needed: `("prompt",)` alone steps many times faster.
             Or the name of a preset: `rl` is the prompt and the rig `rl`, one camera of 84 x 84.
-        traffic: Number of other vehicles.
-        walkers: Number of walkers.
-        weather: Name of one of CARLA's weather presets; seen by cameras only.
+        traffic: Number of other vehicles; without a suite that says it, by the length of lanes.
+        walkers: Number of walkers; likewise.
+        weather: Name of one of CARLA's weather presets, or `route`: what the route file says, which
+            it is by default where the file says any. Seen by cameras only.
         cameras: Name of a rig, `small` (4 x 256 x 144), `paper` (4 x 1600 x 900) or `rl` (one of
             84 x 84), or a `Rig` of one's own; for the group `camera`.
         lidar: Name of a LiDAR, `paper` (32 x 175 rays), `leaderboard` (64 x 937) or `dense`
@@ -77,6 +79,7 @@ class RouteEnvConfig:
         rules: Name of the scoring rules; their penalties make the reward.
         terminate_on: Events that end the episode besides those by which the rules do, such as
             `collision_vehicle`.
+        strict: Refuse a route file of which one route cannot be planned, rather than that route.
     """
 
     suite: str | None = None
@@ -94,6 +97,7 @@ class RouteEnvConfig:
     control_dt_s: float = 0.1
     rules: str = "carla-1.0"
     terminate_on: tuple[str, ...] = ()
+    strict: bool = False
 
     def __post_init__(self) -> None:
         self._expand_preset()
@@ -149,7 +153,7 @@ class RouteEnvConfig:
         for event in self.terminate_on:
             check_name(event, EVENT_KEYS.values(), "event in terminate_on")
         if self.weather is not None:
-            check_name(self.weather, WEATHERS, "weather")
+            check_name(self.weather, (*WEATHERS, ROUTE_WEATHER), "weather")
         check_name(self.rules, RULES, "rules")
         rig_of(self.cameras)
         lidar_of(self.lidar)

@@ -14,9 +14,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from di_envs.config import RouteEnvConfig, check_name
+from di_envs.config import ROUTE_WEATHER, RouteEnvConfig, check_name
 from di_envs.observation import observation_space
 from di_envs.observer import Observer
+from di_envs.planned_routes import PlannedRoutes
 from di_envs.reward import (
     Standing,
     infraction_penalty,
@@ -25,10 +26,11 @@ from di_envs.reward import (
 )
 from di_envs.rules import rules_named
 from di_envs.rules.penalties import Penalties
-from di_envs.suites import choose_suite
+from di_envs.suites import Suite, choose_suite
 from di_envs.town.loading import load_town
-from di_envs.town.plan import RoutePlan
+from di_envs.town.plan import RoutePlan, RouteWeather
 from di_envs.town.town import Town
+from di_envs.traffic_level import driving_lanes_m
 from di_envs.world.event_names import EVENT_KEYS, event_of_key
 from di_envs.world.state import TICK_S, EventKind
 from di_envs.world.world import Event, WorldConfig, WorldView
@@ -47,6 +49,7 @@ class Course:
         stops: Events that end an episode besides those by which the rules do.
         junction_m: Of each route by its id, (R,) how far each of its points is from the next one
             in a junction, along the route; infinite after the last.
+        planned: These routes, those of their file that cannot be planned, and what is to be known.
     """
 
     config: RouteEnvConfig
@@ -56,6 +59,7 @@ class Course:
     penalties: Penalties
     stops: tuple[EventKind, ...]
     junction_m: Mapping[str, NDArray[np.float64]]
+    planned: PlannedRoutes
 
     @property
     def route_ids(self) -> tuple[str, ...]:
@@ -66,10 +70,12 @@ class Course:
         """The index of a route given by id (a string) or by index (an integer).
 
         Raises:
-            ValueError: If there is no such route.
+            ValueError: If there is no such route, or it cannot be planned: says why.
         """
         count = len(self.plans)
         if isinstance(route, str):
+            if route in self.planned.refused:
+                raise ValueError(self.planned.refused[route])
             check_name(route, self.route_ids, "route id")
             return self.route_ids.index(route)
         if isinstance(route, bool) or not isinstance(route, int | np.integer):
@@ -146,7 +152,7 @@ def load_course(options: Mapping[str, Any]) -> Course:
         options: See `RouteEnvConfig`.
 
     Raises:
-        ValueError: If an option is unknown or refused, or a route cannot be planned.
+        ValueError: If an option is unknown or refused, or no route can be planned.
         FileNotFoundError: If there is no such town.
     """
     config = RouteEnvConfig.from_mapping(options)
@@ -157,19 +163,47 @@ def load_course(options: Mapping[str, Any]) -> Course:
         signals=config.signals,
         scenarios=config.scenarios,
     )
-    vehicles = suite.traffic.vehicles if config.traffic is None else config.traffic
-    walkers = suite.traffic.walkers if config.walkers is None else config.walkers
-    weather = config.weather or suite.weather
     town = load_town(suite.town_path, suite.signals)
-    plans = suite.plans(town, config.route_ids)
+    planned = suite.planned(town, config.route_ids, strict=config.strict)
+    level = suite.traffic_in(town)
+    vehicles = level.vehicles if config.traffic is None else config.traffic
+    walkers = level.walkers if config.walkers is None else config.walkers
+    plans, weather = planned.plans, config.weather or suite.weather
+    if config.weather is None and any(plan.weathers for plan in plans):
+        weather, plans = ROUTE_WEATHER, _all_with_weather(plans, suite.weather)
     return Course(
         config=dataclasses.replace(config, traffic=vehicles, walkers=walkers, weather=weather),
         town=town,
         plans=plans,
         world_config=WorldConfig(vehicles=vehicles, walkers=walkers),
+        planned=dataclasses.replace(
+            planned, plans=plans, notes=(*planned.notes, *_traffic_notes(config, suite, town))
+        ),
         penalties=rules_named(config.rules).penalties,
         stops=tuple(event_of_key(name) for name in config.terminate_on),
         junction_m={plan.route_id: junction_distances(town, plan) for plan in plans},
+    )
+
+
+def _all_with_weather(plans: tuple[RoutePlan, ...], name: str) -> tuple[RoutePlan, ...]:
+    """The plans, with the weather of a name where their file says none."""
+    given = (RouteWeather(name=name),)
+    return tuple(
+        plan if plan.weathers else dataclasses.replace(plan, weathers=given) for plan in plans
+    )
+
+
+def _traffic_notes(config: RouteEnvConfig, suite: Suite, town: Town) -> tuple[str, ...]:
+    """How many others were chosen, where neither the user nor the suite says it."""
+    if suite.traffic is not None or None not in (config.traffic, config.walkers):
+        return ()
+    level = suite.traffic_in(town)
+    counts = {"vehicles": config.traffic, "walkers": config.walkers}
+    chosen = [f"{getattr(level, name)} {name}" for name, given in counts.items() if given is None]
+    lanes_km = driving_lanes_m(town.lanes) / 1000.0
+    return (
+        f"Traffic by the length of the map's driving lanes, {lanes_km:.1f} km, at the density of "
+        f"the shipped Town05: {' and '.join(chosen)}.",
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.config import ROUTE_WEATHER
 from di_envs.numerics.arrays import Float32, Float64
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import bind, kernel
@@ -29,7 +30,8 @@ from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.inertial import fill_gnss, fill_imu
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 from di_envs.sensors.lidar.sweep import Lidar
-from di_envs.sensors.weather import weather_of
+from di_envs.sensors.route_weather import keyframes_of, weather_at
+from di_envs.sensors.weather import Weather, weather_of
 from di_envs.town.lanes import Lanes
 from di_envs.town.map_chunks import MapChunks, build_map_chunks
 from di_envs.town.town import Town
@@ -75,10 +77,11 @@ def prompt_observation(prompt: Prompt) -> dict[str, NDArray[Any]]:
 
 
 class Observer:
-    """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables.
+    """Looks at a world through one ego's eyes. Keeps no memory: only buffers and static tables,
+    and which weather the cameras have been told, to tell them no more often than need be.
 
     Attributes:
-        weather: What cameras see from the next `start` on.
+        weather: What cameras see from the next `start` on: a preset, or that of the route's file.
     """
 
     def __init__(
@@ -101,7 +104,8 @@ class Observer:
             cameras: Its rig, or the name of a shipped one; for group `camera`.
             lidar: Its LiDAR, or the name of a shipped one; for group `lidar`.
             half_sweeps: It looks at every tick, so it sees half a turn of the LiDAR each time.
-            weather: What cameras see, one of CARLA's presets; None for ClearNoon.
+            weather: What cameras see, one of CARLA's presets, or `route` for what the route's file
+                says; None for ClearNoon.
         """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
         self._with_odometry = "odometry" in groups
@@ -144,8 +148,9 @@ class Observer:
         )
         self._cameras: CameraRig | None = None
         if self._rig is not None:
-            weather = weather_of(self.weather)
-            self._cameras = CameraRig(self._town, self._rig, weather, self._ego)
+            self._plan = view.plans[self._ego]
+            self._frames = keyframes_of(self._plan.weathers)
+            self._cameras = CameraRig(self._town, self._rig, self._weather_now(), self._ego)
             self._cameras.start(view)
         self._lidar: Lidar | None = None
         if self._lidar_config is not None:
@@ -158,11 +163,29 @@ class Observer:
         """What cameras see from now on; for much less than another `start`."""
         self.weather = weather
         if self._cameras is not None:
-            self._cameras.change_weather(weather_of(weather))
+            self._cameras.change_weather(self._weather_now())
+
+    def _weather_now(self) -> Weather:
+        """What cameras see at the ego's point of its route, which it also notes."""
+        self._weather_point = int(self._sight.state.route_index[self._ego])
+        if self.weather != ROUTE_WEATHER:
+            return weather_of(self.weather)
+        done_m = float(self._plan.route_m[self._weather_point])
+        return weather_at(self._frames, 100.0 * done_m / self._plan.length_m)
+
+    def _follow_weather(self, cameras: CameraRig) -> None:
+        """Shows the weather of where the ego has come to, if that is another."""
+        if self.weather != ROUTE_WEATHER or len(self._frames) == 1:
+            return
+        if int(self._sight.state.route_index[self._ego]) != self._weather_point:
+            cameras.change_weather(self._weather_now())
 
     def front(self) -> dict[str, Any]:
         """What a view for people shows of the observation: the front camera, if there is one."""
-        return {} if self._cameras is None else self._cameras.observe(only="camera_front")
+        if self._cameras is None:
+            return {}
+        self._follow_weather(self._cameras)
+        return self._cameras.observe(only="camera_front")
 
     def observe(self) -> dict[str, Any]:
         """The present observation; every array is a fresh one."""
@@ -192,6 +215,7 @@ class Observer:
         if self._with_odometry:
             observation["odometry"] = _odometry(sight.state, sight.route, self._ego)
         if self._cameras is not None:
+            self._follow_weather(self._cameras)
             observation.update(self._cameras.observe())
         if self._lidar is not None:
             observation.update(self._lidar.observe())

@@ -16,6 +16,7 @@ from di_envs.course import load_course
 from di_envs.drawing.screen import Screen, check_render_mode
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.observer import Observer
+from di_envs.planned_routes import PlannedRoutes
 from di_envs.reward import Standing, standing_of
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, Snapshot, World, WorldView
@@ -58,7 +59,8 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     Attributes:
         config: The options, with the suite's values in place of None.
         world: The world below, for whoever may look behind the scenes.
-        plans: The routes that there are to drive, in the order of `route_ids`.
+        plans: The routes that there are to drive, in the order of `route_ids`. Of a file, those
+            that can be planned; the others are warned about.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own contract)
@@ -76,7 +78,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             options: See `RouteEnvConfig`.
 
         Raises:
-            ValueError: If an option is unknown or refused, or a route cannot be planned.
+            ValueError: If an option is unknown or refused, or no route can be planned.
             FileNotFoundError: If there is no such town.
             RuntimeError: If there is no display for `human`.
         """
@@ -97,6 +99,11 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     def route_ids(self) -> tuple[str, ...]:
         """Ids of the routes, by index."""
         return self._course.route_ids
+
+    @property
+    def planned(self) -> PlannedRoutes:
+        """The routes, those of their file that cannot be planned, and what is to be known."""
+        return self._course.planned
 
     @property
     def view(self) -> WorldView:

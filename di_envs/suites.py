@@ -6,6 +6,7 @@ A suite is a JSON file in `town/data/suites`. A change that can move a score nee
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,30 +15,25 @@ from typing import Any, NoReturn
 from di_envs.config import WEATHERS
 from di_envs.files.json_values import from_json, read_json
 from di_envs.files.names import check_name
+from di_envs.planned_routes import PlannedRoutes, plan_routes
 from di_envs.town.plan import RoutePlan
+from di_envs.town.routing.remarks import RouteWarning
 from di_envs.town.routing.road_graph import build_road_graph
-from di_envs.town.routing.router import MAX_SNAP_M, plan_route
-from di_envs.town.routing.routes import RouteSpec, read_routes
-from di_envs.town.routing.scenarios import with_scenarios
+from di_envs.town.routing.router import MAX_SNAP_M
+from di_envs.town.routing.routes import BrokenRoute, RouteSpec, read_routes
+from di_envs.town.routing.towns import (
+    OfTown,
+    remark_on_towns,
+    routes_of_town,
+    those_asked_for,
+)
 from di_envs.town.routing.trigger_files import PlacedScenario, read_triggers
 from di_envs.town.town import Town
+from di_envs.traffic_level import TrafficLevel, usual_traffic
 
 DATA = Path(__file__).resolve().parent / "town" / "data"
 NO_SCENARIOS = "none"  # in place of a trigger file
 TIMEOUT_RULES = ("carla-1.0",)  # int(0.8 s/m x length + 5 s), see RoutePlan.timeout_s
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrafficLevel:
-    """How many others there are."""
-
-    vehicles: int
-    walkers: int
-
-    def __post_init__(self) -> None:
-        for name, count in dataclasses.asdict(self).items():
-            if type(count) is not int or count < 0:
-                raise ValueError(f"Traffic '{name}' must be a whole number >= 0, got {count!r}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,10 +48,10 @@ class Suite:
         routes: Name of a shipped route file, or path of one.
         signals: As `load_town` takes it; None for those in the map.
         scenarios: Name of a shipped trigger file, path of one or of a folder of them, or several
-            paths with commas between; None for no scenarios.
+            paths with commas between, or `none`; None for those in the route file, if any.
         timeout_rule: Name of the rule for the route timeout.
         weather: Name of one of CARLA's presets.
-        traffic: How many others there are.
+        traffic: How many others there are; None for as many as the town's lanes are long.
         max_snap_m: Largest distance of a keypoint from its lane.
     """
 
@@ -68,7 +64,7 @@ class Suite:
     scenarios: str | None = None
     timeout_rule: str = "carla-1.0"
     weather: str = "ClearNoon"
-    traffic: TrafficLevel = TrafficLevel(vehicles=120, walkers=60)
+    traffic: TrafficLevel | None = None
     max_snap_m: float = MAX_SNAP_M
 
     def __post_init__(self) -> None:
@@ -87,8 +83,8 @@ class Suite:
 
     @property
     def scenario_paths(self) -> tuple[Path, ...]:
-        """The trigger files, or folders of them; none where there are no scenarios."""
-        if self.scenarios is None:
+        """The trigger files, or folders of them; none where there are none."""
+        if self.scenarios is None or self.scenarios == NO_SCENARIOS:
             return ()
         whole = _shipped(self.scenarios, DATA / "scenarios", ".json")
         if whole.exists():
@@ -106,43 +102,75 @@ class Suite:
             route_ids: Take only these; None takes all.
 
         Raises:
-            RouteFileError: If the file is broken.
-            ValueError: If an id is unknown, or no route is in this town.
+            RouteFileError: If the file is broken, or for several towns and not for this one.
+            ValueError: If an id is unknown, or is a route's of another town.
         """
-        specs = _of_town(read_routes(self.routes_path), town, self.routes_path)
-        if route_ids is None:
-            return specs
-        known = {spec.route_id: spec for spec in specs}
-        wanted = [str(route_id) for route_id in route_ids]
-        for route_id in wanted:
-            check_name(route_id, known, f"route id in suite '{self.name}'")
-        return [spec for spec in specs if spec.route_id in wanted]
+        return self._asked_for(self._of_town(town), route_ids).specs
+
+    def _of_town(self, town: str | None) -> OfTown:
+        """The routes for a town; of a shipped file, none may be broken."""
+        broken: list[BrokenRoute] = []
+        specs = read_routes(self.routes_path, None if self.version else broken)
+        return routes_of_town(specs, broken, town, self.routes_path.name)
+
+    def _asked_for(self, found: OfTown, route_ids: Sequence[str] | None) -> OfTown:
+        file = f"suite '{self.name}'" if self.version else self.routes_path.name
+        return those_asked_for(found, route_ids, file)
 
     def plans(self, town: Town, route_ids: Sequence[str] | None = None) -> tuple[RoutePlan, ...]:
-        """Plans the suite's routes in its town.
+        """Plans the suite's routes in its town: those of `planned`.
+
+        Raises:
+            ValueError: As `planned`.
+        """
+        return self.planned(town, route_ids).plans
+
+    def planned(
+        self, town: Town, route_ids: Sequence[str] | None = None, *, strict: bool = False
+    ) -> PlannedRoutes:
+        """Plans the suite's routes in its town, and says what is to be known of them.
+
+        What a person should look at is warned about too (`RouteWarning`), once for the file.
 
         Args:
             town: The town that `town_path` and `signals` describe, loaded.
             route_ids: Plan only these, in the order of the file; None plans all.
+            strict: Refuse all where one route of the file cannot be planned, asked for or not. Of
+                a shipped suite every route that is asked for must be.
 
         Raises:
-            ValueError: As `specs`, if a route cannot be planned (`RouteError`), and if a trigger
-                file is broken (`TriggerFileError`).
+            ValueError: As `specs`, if no route can be planned (`RouteError`), or one where that is
+                strict, if the file was written for another town and fits this one nowhere
+                (`RouteFileError`), and if a trigger file is broken (`TriggerFileError`).
         """
-        graph = build_road_graph(town)
-        specs = self.specs(town.name, route_ids)
-        placed = self.placed_scenarios({town.name, *(spec.town for spec in specs)})
-        plans = (
-            plan_route(
-                town,
-                spec.positions,
-                route_id=spec.route_id,
-                graph=graph,
-                max_snap_m=self.max_snap_m,
-            )
-            for spec in specs
+        graph, file = build_road_graph(town), self.routes_path.name
+        found = self._of_town(town.name)
+        asked = self._asked_for(found, route_ids)
+        remark = "" if self.version else remark_on_towns(graph, found, file)
+        tried = found if strict else asked
+        planned = plan_routes(
+            graph,
+            tried.specs,
+            file=file,
+            max_snap_m=self.max_snap_m,
+            broken=tried.broken,
+            placed=self.placed_scenarios({town.name, *(spec.town for spec in tried.specs)}),
+            own_scenarios=self.scenarios is None,
+            strict=strict or self.version > 0,
         )
-        return tuple(with_scenarios(plan, placed) for plan in plans)
+        chosen = {spec.route_id for spec in asked.specs}
+        planned = dataclasses.replace(
+            planned,
+            plans=tuple(plan for plan in planned.plans if plan.route_id in chosen),
+            warnings=tuple(filter(None, (remark, *planned.warnings))),
+        )
+        for text in planned.warnings:
+            warnings.warn(text, RouteWarning, stacklevel=2)
+        return planned
+
+    def traffic_in(self, town: Town) -> TrafficLevel:
+        """How many others there are: as the suite says, or by the length of the town's lanes."""
+        return self.traffic or usual_traffic(town.lanes)
 
     def placed_scenarios(self, towns: Collection[str]) -> tuple[PlacedScenario, ...]:
         """The scenarios placed in a town, wherever its names are found.
@@ -195,7 +223,8 @@ def choose_suite(
         signals: As `load_town` takes it, instead of the suite's. Another town does not inherit the
             suite's signals.
         scenarios: Name of a shipped trigger file, path of one or of a folder of them, instead of
-            the suite's, or `none`. Another town does not inherit the suite's scenarios.
+            the suite's or those in the route file, or `none`. Another town does not inherit the
+            suite's scenarios.
 
     Raises:
         ValueError: If the name is unknown, if there is neither a name nor both files, or if a file
@@ -215,8 +244,7 @@ def choose_suite(
     if signals is not None:
         chosen = dataclasses.replace(chosen, signals=signals)
     if scenarios is not None:
-        placed = None if scenarios == NO_SCENARIOS else str(scenarios)
-        chosen = dataclasses.replace(chosen, scenarios=placed)
+        chosen = dataclasses.replace(chosen, scenarios=str(scenarios))
     _check_files(chosen)
     return chosen
 
@@ -226,8 +254,9 @@ _CHANGED: dict[str, Any] = {"version": 0, "max_snap_m": MAX_SNAP_M}  # no longer
 
 
 def _in_town(suite: Suite, town: str) -> Suite:
-    """The suite in another town, whose signals and scenarios are its own."""
-    return dataclasses.replace(suite, town=town, signals=None, scenarios=None, **_CHANGED)
+    """The suite in another town, whose signals, scenarios and traffic are its own."""
+    own: dict[str, Any] = {"signals": None, "scenarios": None, "traffic": None}
+    return dataclasses.replace(suite, town=town, **own, **_CHANGED)
 
 
 def _over_routes(suite: Suite, routes: str) -> Suite:
@@ -250,17 +279,6 @@ def _refuse_scenarios(path: Path) -> NoReturn:
         shipped = sorted(path.stem for path in (DATA / "scenarios").glob("*.json"))
         check_name(path.name, [*shipped, NO_SCENARIOS], "trigger file")
     raise ValueError(f"There is no trigger file or folder '{path}'; check the path.")
-
-
-def _of_town(specs: list[RouteSpec], town: str | None, path: Path) -> list[RouteSpec]:
-    """The routes of one town, where a file holds several; a file for one town is taken whole."""
-    towns = dict.fromkeys(spec.town for spec in specs)
-    if town is None or len(towns) == 1:
-        return specs
-    chosen = [spec for spec in specs if spec.town.casefold() == town.casefold()]
-    if not chosen:
-        raise ValueError(f"{path}: no route is in town '{town}'; its towns: {', '.join(towns)}.")
-    return chosen
 
 
 def _shipped(name: str, folder: Path, suffix: str) -> Path:

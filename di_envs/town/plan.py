@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,47 @@ class ScenarioTrigger:
     point: int
 
 
+# Of `carla.WeatherParameters`, and what 2.x adds to it: the percent of the route
+WEATHER_PARAMETERS = (
+    "cloudiness",
+    "precipitation",
+    "precipitation_deposits",
+    "wind_intensity",
+    "sun_azimuth_angle",
+    "sun_altitude_angle",
+    "fog_density",
+    "fog_distance",
+    "fog_falloff",
+    "wetness",
+    "scattering_intensity",
+    "mie_scattering_scale",
+    "rayleigh_scattering_scale",
+    "dust_storm",
+)
+PERCENTAGE = "route_percentage"
+
+
+class Remark(NamedTuple):
+    """What is odd about a planned route."""
+
+    text: str  # a sentence that names the keypoint
+    off_m: float  # by how many metres: what remarks are ranked by
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteWeather:
+    """A `<weather>` of a route: CARLA's weather parameters, under CARLA's names and units.
+
+    Attributes:
+        name: The `id` that some files give it, empty if none.
+        parameters: Such as `cloudiness` or `sun_altitude_angle`; in 2.x also `route_percentage`,
+            the share of the route at which it is reached.
+    """
+
+    name: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class RoutePlan:
     """A dense route of R points at about 1 m, and its T sparse target points. Read-only.
@@ -58,7 +101,8 @@ class RoutePlan:
         0.0,
         0.0,
     )  # of the town: latitude, longitude [deg] of x = y = 0
-    remarks: tuple[str, ...] = ()  # what is odd about it, a sentence each
+    remarks: tuple[Remark, ...] = ()  # what is odd about it
+    weathers: tuple[RouteWeather, ...] = ()  # that its file asks for
 
     @property
     def length_m(self) -> float:

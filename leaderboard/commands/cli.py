@@ -108,7 +108,8 @@ def _plain_warnings() -> Iterator[None]:
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
         if str(message) not in told:
             told.add(str(message))
-            complain(str(message), "[yellow]warning[/yellow]")
+            for line in str(message).splitlines():
+                complain(line, "[yellow]warning[/yellow]")
 
     with warnings.catch_warnings():
         warnings.showwarning = show

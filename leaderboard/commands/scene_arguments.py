@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Those below that are options of the environment; the agent is not
 _OPTIONS = (
     *("suite", "town", "routes", "signals", "scenarios"),
-    *("traffic", "walkers", "weather", "rules"),
+    *("traffic", "walkers", "weather", "rules", "strict"),
 )
 
 
@@ -45,16 +45,19 @@ class SceneArguments:
     """For maps without signals: a sidecar file, a shipped one's name, or `synthesise`."""
 
     scenarios: Annotated[str | None, says("NAME|FILE|DIR|none", "the suite's")] = None
-    """CARLA trigger files of the Leaderboard's scenarios; `none` drives without."""
+    """CARLA trigger files, in place of scenarios in the route file; `none` drives without."""
 
-    traffic: Annotated[int | None, says("N", "the suite's")] = None
+    traffic: Annotated[int | None, says("N", "the suite's, or by lane length")] = None
     """Number of other vehicles."""
 
-    walkers: Annotated[int | None, says("N", "the suite's")] = None
+    walkers: Annotated[int | None, says("N", "the suite's, or by lane length")] = None
     """Number of walkers."""
 
-    weather: Annotated[str | None, says("NAME", "the suite's")] = None
+    weather: Annotated[str | None, says("NAME", "the route file's or suite's")] = None
     """One of CARLA's presets, such as HardRainNoon; seen by cameras."""
+
+    strict: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Refuse a route file of which one route cannot be planned, rather than that route."""
 
     rules: Annotated[str, says("NAME", "carla-1.0")] = "carla-1.0"
     """Name of the scoring rules."""
@@ -91,7 +94,7 @@ class SceneArguments:
         from di_envs.suites import choose_suite
 
         given = {name: getattr(self, name) for name in _OPTIONS}
-        options = {name: value for name, value in given.items() if value is not None}
+        options = {n: value for n, value in given.items() if not (value is None or value is False)}
         if route_ids:
             options["route_ids"] = route_ids
         try:
@@ -103,7 +106,7 @@ class SceneArguments:
                 signals=self.signals,
                 scenarios=self.scenarios,
             )
-            suite.specs(route_ids=route_ids or None)
+            suite.specs(suite.town_path.stem, route_ids or None)
         except (ValueError, OSError) as error:
             raise UsageError(str(error)) from error
         return options, suite

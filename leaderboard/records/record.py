@@ -26,6 +26,8 @@ SIMULATION_CRASHED = "Failed - Simulation crashed"
 # Ours, for routes whose worker process died, and those that took too long by the clock on the wall
 WORKER_DIED = "Failed - Worker died"
 OUT_OF_TIME = "Failed - Wall-clock limit"
+# Ours, for routes of a file that could not be planned; nobody drove them
+NOT_PLANNED = "Failed - Route could not be planned"
 # What says nothing of the driving: such routes are left out of every mean and every pair
 LOST = frozenset({SIMULATION_CRASHED, WORKER_DIED, OUT_OF_TIME})
 
@@ -85,6 +87,8 @@ class RouteRecord:
         wall_s: Wall-clock time that it took; the only thing here that a rerun changes.
         observation_hash: BLAKE2b of every observation in order; so the other two.
         interventions: What was done to the world or to what the agent saw, as text.
+        weather: What cameras saw, but for interventions: a preset, or the keyframes that the route
+            file has; empty in records from before it was kept.
         scenarios: How many scenarios of each type were triggered.
         state_hash: Of the ego at every decision, and of the whole world at the end.
         controls: Every control carried out, packed; see `control_array`.
@@ -113,6 +117,7 @@ class RouteRecord:
     reward_hash: str
     event_hash: str
     interventions: tuple[str, ...] = ()
+    weather: str = ""
     scenarios: Mapping[str, int] = field(default_factory=dict)
     state_hash: str = ""
     controls: str = ""
@@ -149,6 +154,21 @@ class RouteRecord:
         return tuple(sorted((name, repr(value)) for name, value in values.items()))
 
 
+def undriven_record(**known: Any) -> RouteRecord:
+    """A route of which nothing more than this is known, as nobody drove it to any end."""
+    values: dict[str, Any] = {
+        "world_seed": 0,
+        "score": Score(route_completion=0.0, infraction_score=1.0),
+        "steps": 0,
+        "bound": None,
+        **dict.fromkeys(("length_m", "keypoints_m", "done_m", "travelled_m", "game_s"), 0.0),
+        **dict.fromkeys(("route_hash", "observation_hash", "reward_hash", "event_hash"), ""),
+        "wall_s": 0.0,
+        **known,
+    }
+    return RouteRecord(**values)
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunRecord:
     """A run of one agent over routes and seeds, finished or not.
@@ -163,6 +183,8 @@ class RunRecord:
         routes_hash: Of the ids and points of all routes that the run is over.
         planned: Number of (route, seed) pairs that were asked for.
         interventions: What was edited of what the agent saw, in every route, as text.
+        refused: Why routes of the file could not be planned, by their id; `planned` is without.
+        notes: What else is to be known of it: what was left out of the file, what was chosen.
         routes: Those driven, by `index`.
     """
 
@@ -182,6 +204,8 @@ class RunRecord:
     cpu: str
     planned: int
     interventions: tuple[str, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     routes: tuple[RouteRecord, ...] = ()
 
     @property

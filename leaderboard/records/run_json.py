@@ -14,6 +14,8 @@ from leaderboard.records.versions import INFORMATION
 FORMAT = "driveinsight-run"
 ROUTE_FORMAT = "driveinsight-route"
 FORMAT_VERSION = 3
+# Left out where empty, as in files from before there were any
+_SINCE = ("interventions", "refused", "notes")
 
 
 def run_hash(run: RunRecord) -> str:
@@ -32,8 +34,9 @@ def run_to_json(run: RunRecord) -> dict[str, Any]:
     """The run as JSON values, without its routes."""
     fields = to_json(run)
     del fields["routes"]
-    if not run.interventions:  # left out, as in files from before there were any
-        del fields["interventions"]
+    for name in _SINCE:
+        if not fields[name]:
+            del fields[name]
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **fields}
 
 
@@ -47,7 +50,7 @@ def run_from_json(content: Mapping[str, Any], source: str = "run") -> RunRecord:
     Raises:
         JsonError: If a field is missing, unknown or of another type.
     """
-    values: dict[str, Any] = {"interventions": [], "routes": []}
+    values: dict[str, Any] = {"interventions": [], "refused": {}, "notes": [], "routes": []}
     for name, value in content.items():
         if name == "routes":
             raise JsonError(f"{source}: unknown field 'routes'; each has a file of its own")
@@ -59,6 +62,8 @@ def run_from_json(content: Mapping[str, Any], source: str = "run") -> RunRecord:
 def route_to_json(record: RouteRecord) -> dict[str, Any]:
     """The route as JSON values."""
     values: dict[str, Any] = to_json(record)
+    if not record.weather:  # as in files from before it was kept
+        del values["weather"]
     values["score"]["driving_score"] = record.score.driving_score
     return values
 
@@ -74,7 +79,7 @@ def route_from_json(content: Mapping[str, Any], source: str = "route") -> RouteR
         JsonError: If a field is missing, unknown or of another type, or if the driving score is not
             the product of the others.
     """
-    values, given = dict(content), None
+    values, given = {"weather": "", **content}, None
     if isinstance(score := values.get("score"), Mapping):
         values["score"] = {name: part for name, part in score.items() if name != "driving_score"}
         given = score.get("driving_score")

@@ -25,7 +25,7 @@ from leaderboard.replaying.replay import logged, replay_env, sensor_options
 from leaderboard.replaying.retracing import Decision, retrace
 from leaderboard.replaying.timed_edits import TimedEdit, decisions_before
 from leaderboard.running.episode import close_agent
-from leaderboard.running.finished_route import route_record
+from leaderboard.running.finished_route import route_record, shown_weather
 from leaderboard.running.jobs import Job
 from leaderboard.running.log import EpisodeLog
 
@@ -97,6 +97,7 @@ def branch(
             rules_named(run.rules),
             log,
             fault=going.fault,
+            weather=shown_weather(env),
             interventions=(*record.interventions, *timed),
             wall_s=time.perf_counter() - started_s,
         )
@@ -138,7 +139,12 @@ def branch_run(run: RunRecord, branch: Branch) -> RunRecord:
     """A run of the edited future alone: it can be written, replayed and verified as any other."""
     options = {**run.options, "route_ids": [branch.edited.route_id]}
     return dataclasses.replace(
-        run, options=options, seeds=(branch.edited.seed,), planned=1, routes=(branch.edited,)
+        run,
+        options=options,
+        seeds=(branch.edited.seed,),
+        planned=1,
+        refused={},
+        routes=(branch.edited,),
     )
 
 

@@ -31,7 +31,7 @@ from leaderboard.replaying.file_problems import spelling_problems, table_problem
 from leaderboard.replaying.recorded_agent import run_eyes
 from leaderboard.replaying.recorded_edits import seen_texts
 from leaderboard.replaying.replay import ReplayError, logged, replay, replay_env, sensor_options
-from leaderboard.running.finished_route import route_record
+from leaderboard.running.finished_route import route_record, shown_weather
 from leaderboard.running.jobs import Job, plan_jobs
 from leaderboard.running.log import EpisodeLog
 from wrappers.interventions.context import context_of
@@ -154,7 +154,9 @@ def replayed_record(run: RunRecord, record: RouteRecord, env: RouteEnv) -> Route
     if step.over and fault[0]:
         raise ReplayError(f"the route was driven to its end, yet its status is '{record.status}'")
     job = Job(index=record.index, route_id=record.route_id, seed=record.seed)
-    return route_record(step.view, job, rules_named(run.rules), log, fault=fault)
+    return route_record(
+        step.view, job, rules_named(run.rules), log, fault=fault, weather=shown_weather(env)
+    )
 
 
 def _check_problems(record: RouteRecord) -> Iterator[str]:

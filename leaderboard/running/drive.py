@@ -73,6 +73,8 @@ def drive(
         spec = _of_one_route(spec, route_id)
         env, edits = _environment(spec, requires, filmed=video is not None, camera=camera)
         closing.callback(env.close)
+        for note in env.planned.notes:
+            console.print(escape(note), soft_wrap=True, highlight=False)
         driver = _edited(edits, agent, spec.agent)
         film = None
         if video is not None:

@@ -27,7 +27,7 @@ from leaderboard.records.record import (
     SIMULATION_CRASHED,
     RouteRecord,
 )
-from leaderboard.running.finished_route import lost_record, route_record
+from leaderboard.running.finished_route import lost_record, route_record, shown_weather
 from leaderboard.running.jobs import Job
 from leaderboard.running.log import EpisodeLog
 
@@ -81,6 +81,7 @@ def drive_route(
         rules,
         log,
         fault=(status, reason),
+        weather=shown_weather(env.unwrapped),
         interventions=interventions,
         wall_s=time.perf_counter() - started_s,
     )

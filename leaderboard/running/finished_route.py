@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.config import ROUTE_WEATHER
+from di_envs.route_env import RouteEnv
 from di_envs.rules import Rules
+from di_envs.sensors.route_weather import keyframes_of, keyframes_text
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import TICK_S, EventKind
 from di_envs.world.world import Event, WorldView
@@ -21,11 +24,12 @@ from leaderboard.records.record import (
     SIMULATION_CRASHED,
     EventRecord,
     RouteRecord,
+    undriven_record,
 )
 from leaderboard.running.bound import light_limited_bound
 from leaderboard.running.jobs import Job
 from leaderboard.running.log import EpisodeLog, event_record
-from leaderboard.scoring.score import Progress, Score, score_route
+from leaderboard.scoring.score import Progress, score_route
 
 
 def route_record(
@@ -36,6 +40,7 @@ def route_record(
     *,
     fault: tuple[str, str] = ("", ""),
     interventions: tuple[str, ...] = (),
+    weather: str = "",
     wall_s: float = 0.0,
 ) -> RouteRecord:
     """The finished route: its score, and everything needed to tell it from another.
@@ -47,6 +52,7 @@ def route_record(
         log: What was gathered.
         fault: CARLA's status and the reason, where code ended the route.
         interventions: What was done to the world or to what the agent saw, as text.
+        weather: What cameras saw, see `shown_weather`.
         wall_s: Wall-clock time that it took.
     """
     state, plan, ego = view.state, view.plans[view.ego], view.ego
@@ -77,6 +83,7 @@ def route_record(
         bound=light_limited_bound(view.town, plan, job.world_seed),
         events=events,
         interventions=interventions,
+        weather=weather,
         scenarios=_scenarios(events),
         route_hash=route_hash(plan),
         observation_hash=observation_hash,
@@ -89,6 +96,12 @@ def route_record(
     )
 
 
+def shown_weather(env: RouteEnv) -> str:
+    """What cameras see on the route being driven, but for what is edited: as records have it."""
+    name = env.config.weather or ""
+    return keyframes_text(keyframes_of(env.plan.weathers)) if name == ROUTE_WEATHER else name
+
+
 def _scenarios(events: Iterable[EventRecord]) -> Mapping[str, int]:
     """How many scenarios began of each type, by the Leaderboard's number."""
     types = sorted(int(event.value) for event in events if event.kind == EventKind.SCENARIO)
@@ -97,26 +110,13 @@ def _scenarios(events: Iterable[EventRecord]) -> Mapping[str, int]:
 
 def lost_record(job: Job, reason: str) -> RouteRecord:
     """A route of which nothing is known: its simulator or its process died."""
-    return RouteRecord(
+    return undriven_record(
         route_id=job.route_id,
         seed=job.seed,
         index=job.index,
         world_seed=job.world_seed,
         status=SIMULATION_CRASHED,
         reason=reason,
-        score=Score(route_completion=0.0, infraction_score=1.0),
-        length_m=0.0,
-        keypoints_m=0.0,
-        done_m=0.0,
-        travelled_m=0.0,
-        game_s=0.0,
-        steps=0,
-        wall_s=0.0,
-        bound=None,
-        route_hash="",
-        observation_hash="",
-        reward_hash="",
-        event_hash="",
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from agents.base import Requirements
 from leaderboard.records.record import RouteRecord
@@ -22,6 +22,8 @@ class RunFacts:
     routes_hash: str
     versions: Mapping[str, str]
     cpu: str
+    refused: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

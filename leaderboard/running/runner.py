@@ -124,6 +124,7 @@ class _Evaluation:
         self._spec, self._seeds, self._suite = spec, seeds, suite
         self._folder, self._resume, self._display = folder, resume, display
         self._again: set[int] = set()
+        self._told: set[str] = set()
         self.jobs: deque[Job] = deque()
         self.run: RunRecord | None = None
 
@@ -143,6 +144,7 @@ class _Evaluation:
             case Compiling():
                 self._display.compiling(event)
             case Warned(text=text):
+                self._told.add(text)
                 warnings.warn(text, stacklevel=2)
 
     def _begin(self, scene: RunFacts) -> None:
@@ -154,6 +156,9 @@ class _Evaluation:
         done = {record.index for record in run.routes}
         self.run = run
         self.jobs.extend(job for job in jobs if job.index not in done)
+        for note in run.notes:
+            if note not in self._told:
+                self._display.say(note)
         self._display.plan(len(jobs), len(done))
 
     def _try_again(self, job: Job, status: str, reason: str) -> bool:
@@ -204,6 +209,8 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -
         cpu=scene.cpu,
         planned=len(jobs),
         interventions=tuple(map(str, spec.interventions)),
+        refused=dict(scene.refused),
+        notes=scene.notes,
     )
 
 

@@ -79,7 +79,7 @@ def made_agent(spec: str) -> tuple[Agent[Any], Requirements]:
 
 def run_facts(driver: Driver) -> RunFacts:
     """What there is to drive, and with what."""
-    town = driver.env.view.town
+    town, planned = driver.env.view.town, driver.env.planned
     routes = hashlib.blake2b(digest_size=16)
     for plan in driver.env.plans:
         routes.update(f"{plan.route_id}\0{route_hash(plan)}\0".encode())
@@ -92,4 +92,6 @@ def run_facts(driver: Driver) -> RunFacts:
         routes_hash=routes.hexdigest(),
         versions=package_versions(driver.spec.agent),
         cpu=cpu_capability(),
+        refused=planned.refused,
+        notes=(*planned.warnings, *planned.notes),
     )

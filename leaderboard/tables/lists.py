@@ -59,11 +59,16 @@ def suite_table() -> Table:
             str(suite.version),
             suite.town,
             str(len(suite.specs())),
-            str(suite.traffic.vehicles),
-            str(suite.traffic.walkers),
+            *_traffic_cells(suite),
             escape(suite.description),
         )
     return table
+
+
+def _traffic_cells(suite: Suite) -> tuple[str, str]:
+    if suite.traffic is None:
+        return "by length", "by length"
+    return str(suite.traffic.vehicles), str(suite.traffic.walkers)
 
 
 _NUMBERS = ("version", "routes", "vehicles", "walkers")

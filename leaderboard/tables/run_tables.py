@@ -27,7 +27,7 @@ def seed_means(records: Sequence[RouteRecord], value: str, seeds: Iterable[int])
 def run_tables(run: RunRecord) -> Group:
     """The leaderboard table of a run, its infractions by kind, and what they rest on."""
     if not run.scored:
-        lost = [Text(line) for line in _lost_lines(run)]
+        lost = [Text(line) for line in (*_refused_lines(run), *_lost_lines(run), *run.notes)]
         return Group(Text("no route was finished: there is nothing to show"), *lost)
     tables = [_route_table(run), _infraction_table(run)]
     if any(record.scenarios for record in run.scored):
@@ -50,9 +50,17 @@ def _route_table(run: RunRecord) -> Table:
     for route_id in dict.fromkeys(record.route_id for record in run.routes):
         records = [record for record in run.routes if record.route_id == route_id]
         table.add_row(escape(route_id), *_cells(records, run))
+    for route_id, why in run.refused.items():
+        reason = _briefly(why.removeprefix(f"Route '{route_id}': "))
+        table.add_row(escape(route_id), *["-"] * 5, escape(f"could not be planned: {reason}"))
     table.add_section()
     table.add_row("mean", *_mean_cells(run), style="bold")
     return table
+
+
+def _briefly(reason: str) -> str:
+    """What is wrong, without what to do about it, which stands below the table."""
+    return reason.partition("; ")[0].partition(". ")[0]
 
 
 def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
@@ -173,7 +181,18 @@ def _caption(run: RunRecord) -> str:
     ]
     if not run.complete:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
-    return "\n".join([*lines, *_lost_lines(run)])
+    return "\n".join([*lines, *_refused_lines(run), *_lost_lines(run), *run.notes])
+
+
+def _refused_lines(run: RunRecord) -> list[str]:
+    """That routes of the file were not driven by anybody."""
+    if not run.refused:
+        return []
+    driven = len({record.route_id for record in run.routes})
+    return [
+        f"Left out of every mean: {len(run.refused)} of {driven + len(run.refused)} routes, which "
+        "could not be planned (--strict refuses the file)."
+    ]
 
 
 def _lost_lines(run: RunRecord) -> list[str]:

@@ -1,21 +1,24 @@
 """CARLA route files: reading them, in the layouts of Leaderboard 1.0 and 2.x, and writing them.
 
 1.0 lists `<waypoint x= y= z= pitch= roll= yaw=/>` below each `<route>`, 2.x lists
-`<waypoints><position x= y= z=/></waypoints>`; each may say its weather. Scenarios, which 2.x puts
-into the same file, are not read.
+`<waypoints><position x= y= z=/></waypoints>`; each may say its weather. In 2.x a route may
+have `<scenarios><scenario name= type=><trigger_point x= y= z= yaw=/></scenario></scenarios>`, too.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from di_envs.town.plan import PERCENTAGE, WEATHER_PARAMETERS
+from di_envs.town.plan import RouteWeather as RouteWeather  # from here, too
 
 Layout = Literal["1.0", "2.x"]
 
@@ -35,18 +38,15 @@ class Keypoint(NamedTuple):
     yaw_deg: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class RouteWeather:
-    """A `<weather>` of a route: CARLA's weather parameters, under CARLA's names and units.
+class RouteScenario(NamedTuple):
+    """A `<scenario>` of a route in 2.x: what happens, and the pose that triggers it."""
 
-    Attributes:
-        name: The `id` that some files give it, empty if none.
-        parameters: Such as `cloudiness` or `sun_altitude_angle`; in 2.x also `route_percentage`,
-            the share of the route at which it is reached.
-    """
-
-    name: str = ""
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    name: str
+    type: str  # CARLA's, such as DynamicObjectCrossing
+    x: float  # m, world frame
+    y: float
+    z: float
+    yaw_deg: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +57,7 @@ class RouteSpec:
     town: str
     keypoints: tuple[Keypoint, ...]
     weathers: tuple[RouteWeather, ...] = ()
+    scenarios: tuple[RouteScenario, ...] = ()
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -64,29 +65,48 @@ class RouteSpec:
         return np.array([keypoint[:3] for keypoint in self.keypoints], dtype=np.float64)
 
 
-def read_routes(path: str | Path) -> list[RouteSpec]:
+class BrokenRoute(NamedTuple):
+    """A route of a file that cannot be read, beside others that can."""
+
+    route_id: str
+    town: str
+    why: str
+
+
+def read_routes(path: str | Path, broken: list[BrokenRoute] | None = None) -> list[RouteSpec]:
     """Reads a CARLA route file.
 
     Args:
         path: XML file; both layouts are understood, route by route.
+        broken: Where given, routes that have an id and a town but are broken otherwise are put
+            here and left out; else they are refused with the file.
 
     Returns:
         The routes in the order of the file; at least one.
 
     Raises:
         RouteFileError: If the file is missing, is no XML, holds no routes, or if a route lacks its
-            id, its town or two keypoints, has a coordinate that is no finite number, or has the id
-            of an earlier route.
+            id, its town or two keypoints, has a coordinate, a parameter of its weather or a place
+            of a scenario that is no finite number, or has the id of an earlier route.
     """
     path = Path(path)
     routes: dict[str, RouteSpec] = {}
     for element in _root_of(path).iter("route"):
-        route = _route(element, path)
+        try:
+            route = _route(element, path)
+        except RouteFileError as error:
+            route_id, town = element.get("id"), element.get("town")
+            if broken is None or not route_id or not town:
+                raise
+            broken.append(BrokenRoute(route_id, town, str(error)))
+            continue
         if route.route_id in routes:
             raise RouteFileError(
                 f"{path}: two routes have the id '{route.route_id}'; give each an id of its own."
             )
         routes[route.route_id] = route
+    if not routes and broken:
+        raise RouteFileError(broken[0].why)
     if not routes:
         raise RouteFileError(
             f"{path}: expected <route> elements as in CARLA's route files, found none."
@@ -112,6 +132,7 @@ def write_routes(path: str | Path, routes: Iterable[RouteSpec], layout: Layout =
     for route in routes:
         element = ET.SubElement(root, "route", id=route.route_id, town=route.town)
         _write_weathers(element, route.weathers)
+        _write_scenarios(element, route.scenarios)
         if layout == "2.x":
             element = ET.SubElement(element, "waypoints")
         for keypoint in route.keypoints:
@@ -141,17 +162,19 @@ def _route(element: ET.Element, path: Path) -> RouteSpec:
         raise RouteFileError(
             f"{path}: expected <route id=… town=…>, got attributes {dict(element.attrib)}."
         )
+    where = f"{path}: route '{route_id}'"
     points = element.findall("waypoint") or element.findall("waypoints/position")
     if len(points) < 2:
         raise RouteFileError(
-            f"{path}: route '{route_id}' has {len(points)} keypoints; expected at least two "
+            f"{where} has {len(points)} keypoints; expected at least two "
             "<waypoint> or <waypoints><position> elements, a start and an end."
         )
     return RouteSpec(
         route_id=route_id,
         town=town,
-        keypoints=tuple(_keypoint(point, f"{path}: route '{route_id}'") for point in points),
-        weathers=tuple(_weather(weather) for weather in element.iter("weather")),
+        keypoints=tuple(_keypoint(point, where) for point in points),
+        weathers=tuple(_weather(weather, where) for weather in element.iter("weather")),
+        scenarios=tuple(_scenario(scenario, where) for scenario in element.iter("scenario")),
     )
 
 
@@ -174,15 +197,26 @@ def _number(element: ET.Element, key: str, where: str, default: str | None = Non
     return value
 
 
-def _weather(element: ET.Element) -> RouteWeather:
-    parameters = {}
-    for key, text in element.attrib.items():
-        try:
-            parameters[key] = float(text)
-        except ValueError:
-            continue  # a name, not a parameter
-    parameters.pop("id", None)
+def _weather(element: ET.Element, where: str) -> RouteWeather:
+    parameters = {key: _number(element, key, where) for key in element.attrib if _counts(key)}
     return RouteWeather(name=element.get("id", ""), parameters=parameters)
+
+
+def _counts(key: str) -> bool:
+    """Whether an attribute of a weather is a number to CARLA."""
+    return key == PERCENTAGE or key in WEATHER_PARAMETERS
+
+
+def _scenario(element: ET.Element, where: str) -> RouteScenario:
+    kind, trigger = element.get("type"), element.find("trigger_point")
+    if not kind or trigger is None:
+        raise RouteFileError(
+            f"{where}: expected <scenario name=… type=…><trigger_point x=… y=… z=… yaw=…/>, got "
+            f"attributes {dict(element.attrib)} around {[child.tag for child in element]}."
+        )
+    x, y, z = (_number(trigger, key, where) for key in "xyz")
+    yaw_deg = _number(trigger, "yaw", where, "0")  # CARLA's default
+    return RouteScenario(element.get("name", ""), kind, x, y, z, yaw_deg)
 
 
 def _write_weathers(route: ET.Element, weathers: Iterable[RouteWeather]) -> None:
@@ -195,6 +229,15 @@ def _write_weathers(route: ET.Element, weathers: Iterable[RouteWeather]) -> None
             element.set("id", weather.name)
         for key, value in weather.parameters.items():
             element.set(key, repr(float(value)))
+
+
+def _write_scenarios(route: ET.Element, scenarios: Iterable[RouteScenario]) -> None:
+    parent = None
+    for scenario in scenarios:
+        parent = ET.SubElement(route, "scenarios") if parent is None else parent
+        element = ET.SubElement(parent, "scenario", name=scenario.name, type=scenario.type)
+        values = zip(("x", "y", "z", "yaw"), scenario[2:], strict=True)
+        ET.SubElement(element, "trigger_point", {key: repr(float(value)) for key, value in values})
 
 
 def _write_keypoint(parent: ET.Element, keypoint: Keypoint, layout: Layout) -> None:

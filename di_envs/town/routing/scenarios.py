@@ -17,19 +17,35 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.plan import RoadOption, RoutePlan, ScenarioTrigger
+from di_envs.town.routing.routes import RouteScenario
 from di_envs.town.routing.trigger_files import PlacedScenario
 
 MATCH_M = 2.0
 MATCH_RAD = math.radians(10.0)
 START_M = 1.5  # from the trigger to the route point nearest to the ego
 STAGED = (1, 3, 4, 7, 8, 9, 10)  # 2, 5 and 6 are in no file of the Town05 benchmark
+
+# The numbers of what Leaderboard 2.x calls by names, in its route files
+NUMBER_OF_TYPE = {
+    "ControlLoss": 1,
+    "DynamicObjectCrossing": 3,
+    "VehicleTurningRoute": 4,
+    "VehicleTurningRoutePedestrian": 4,
+    "OppositeVehicleRunningRedLight": 7,
+    "SignalizedJunctionLeftTurn": 8,
+    "SignalizedJunctionRightTurn": 9,
+    "NonSignalizedJunctionLeftTurn": 10,
+    "NonSignalizedJunctionLeftTurnEnterFlow": 10,
+    "NonSignalizedJunctionRightTurn": 10,
+}
 
 # The variants by the command at the next turn; numbers that are not here have one only.
 SUBTYPES = {
@@ -44,6 +60,20 @@ SUBTYPES = {
 }
 
 _NOT_TURNS = (RoadOption.LANEFOLLOW, RoadOption.CHANGELANELEFT, RoadOption.CHANGELANERIGHT)
+
+
+def placed_on_routes(scenarios: Iterable[RouteScenario]) -> tuple[PlacedScenario, ...]:
+    """Those scenarios of a 2.x route file that are of types that there are here."""
+    return tuple(
+        PlacedScenario(NUMBER_OF_TYPE[s.type], s.x, s.y, s.z, math.radians(s.yaw_deg))
+        for s in scenarios
+        if s.type in NUMBER_OF_TYPE
+    )
+
+
+def types_left_out(scenarios: Iterable[RouteScenario]) -> Counter[str]:
+    """How many there are of each type that there is not."""
+    return Counter(s.type for s in scenarios if s.type not in NUMBER_OF_TYPE)
 
 
 class _Candidate(NamedTuple):

@@ -19,6 +19,7 @@ from leaderboard.records.carla.words import (
     SCORE_LABELS,
     carla_status,
     infraction_messages,
+    refused_records,
     sensors_of,
 )
 from leaderboard.records.record import RouteRecord, RunRecord
@@ -32,17 +33,18 @@ def carla_results(run: RunRecord) -> dict[str, Any]:
 
 
 def _results(run: RunRecord, rules: Rules) -> dict[str, Any]:
-    records = [_route(record, rules) for record in run.routes]
+    refused = refused_records(run)
+    records = [_route(record, rules) for record in (*run.routes, *refused)]
     whole = _global(run.scored, records, rules) if run.scored else {}
     values, labels = _table(whole, rules) if whole else ([], [])
     return {
         "_checkpoint": {
             "global_record": whole,
-            "progress": [len(records), run.planned],
+            "progress": [len(records), run.planned + len(refused)],
             "records": records,
         },
         "entry_status": _entry_status(run),
-        "eligible": run.complete and not run.lost,
+        "eligible": run.complete and not run.lost and not run.refused,
         "sensors": sensors_of(run),
         "values": values,
         "labels": labels,
@@ -54,6 +56,8 @@ def _entry_status(run: RunRecord) -> str:
         return "Finished with missing data" if run.routes else "Started"
     if run.lost:
         return "Crashed"
+    if run.refused:
+        return "Finished with missing data"
     if any("Agent" in record.status for record in run.routes):
         return "Finished with agent errors"
     return "Finished"

@@ -21,6 +21,7 @@ from leaderboard.records.carla.words import (
     YIELD,
     carla_status,
     infraction_messages,
+    refused_records,
     sensors_of,
 )
 from leaderboard.records.record import RouteRecord, RunRecord
@@ -34,14 +35,15 @@ _OFF_ROAD = KEYS[EventKind.OUTSIDE_LANES][0]
 def carla_results_2(run: RunRecord, rules: Rules) -> dict[str, Any]:
     """The content of `results.json` for this run, as JSON values."""
     repetition = {seed: number for number, seed in enumerate(run.seeds)}
-    records = [_route(record, repetition[record.seed], rules) for record in run.routes]
+    everything = (*run.routes, *refused_records(run))
+    records = [_route(record, repetition[record.seed], rules) for record in everything]
     whole = _global(records, run, rules) if run.scored else {}
     values, labels = _table(whole, rules) if whole else ([], [])
     status = _entry_status(run)
     return {
         "_checkpoint": {
             "global_record": whole,
-            "progress": [len(records), run.planned],
+            "progress": [len(records), run.planned + len(everything) - len(run.routes)],
             "records": records,
         },
         "entry_status": status,
@@ -57,6 +59,8 @@ def _entry_status(run: RunRecord) -> str:
         return "Started"
     if run.lost:
         return "Crashed"
+    if run.refused:
+        return "Invalid"
     if any("sensors were invalid" in record.status for record in run.routes):
         return "Rejected"
     return "Finished"
@@ -94,7 +98,8 @@ def _route(record: RouteRecord, repetition: int, rules: Rules) -> dict[str, Any]
 def _global(
     everything: Sequence[Mapping[str, Any]], run: RunRecord, rules: Rules
 ) -> dict[str, Any]:
-    records = [record for record, kept in zip(everything, run.routes, strict=True) if not kept.lost]
+    driven = everything[: len(run.routes)]  # the rest could not be planned
+    records = [record for record, kept in zip(driven, run.routes, strict=True) if not kept.lost]
     planned = run.planned - len(run.lost)
     means = {
         name: round(math.fsum(r["scores"][name] for r in records) / planned, _SCORE_DECIMALS)

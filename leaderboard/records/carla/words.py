@@ -10,7 +10,14 @@ from types import MappingProxyType
 
 from di_envs.rules import Rules
 from di_envs.world.kinds import EventKind
-from leaderboard.records.record import SIMULATION_CRASHED, EventRecord, RouteRecord, RunRecord
+from leaderboard.records.record import (
+    NOT_PLANNED,
+    SIMULATION_CRASHED,
+    EventRecord,
+    RouteRecord,
+    RunRecord,
+    undriven_record,
+)
 from leaderboard.scoring.score import share_of_distance
 
 # (event, key of its list, label of its rate)
@@ -51,6 +58,21 @@ def sensors_of(run: RunRecord) -> list[str]:
 def carla_status(record: RouteRecord) -> str:
     """The route's status in CARLA's words, which has one for all that the machinery lost."""
     return SIMULATION_CRASHED if record.lost else record.status
+
+
+def refused_records(run: RunRecord) -> tuple[RouteRecord, ...]:
+    """A record that says nothing for each route that could not be planned, and each seed."""
+    pairs = [(route_id, seed) for route_id in run.refused for seed in run.seeds]
+    return tuple(
+        undriven_record(
+            route_id=route_id,
+            seed=seed,
+            index=run.planned + number,
+            status=NOT_PLANNED,
+            reason=run.refused[route_id],
+        )
+        for number, (route_id, seed) in enumerate(pairs)
+    )
 
 
 def infraction_messages(record: RouteRecord, rules: Rules) -> dict[str, list[str]]:

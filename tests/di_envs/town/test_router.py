@@ -311,6 +311,6 @@ def test_a_route_against_the_lane_is_refused_not_planned_to_no_length(toy: RoadG
 
 def test_a_keypoint_beside_its_lane_and_too_high_is_named(toy: RoadGraph) -> None:
     plan = plan_route(toy.town, [(-60.0, 55.25, 0.0), (-20.0, 55.25, 6.0)], graph=toy)
-    (remark,) = [r for r in plan.remarks if "lies" in r]
+    (remark,) = [remark.text for remark in plan.remarks if "lies" in remark.text]
     assert "keypoint 1" in remark
     assert "6.0 m from its lane, 6.0 m too high" in remark

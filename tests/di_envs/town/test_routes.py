@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from di_envs.town.routing.routes import (
     Keypoint,
     RouteFileError,
+    RouteScenario,
     RouteSpec,
     RouteWeather,
     read_routes,
@@ -65,6 +66,7 @@ def test_a_file_of_leaderboard_2_gives_positions_and_weathers_along_the_route(
     (route,) = read_routes(written(tmp_path, LEADERBOARD_2))
     np.testing.assert_array_equal(route.positions, [[1, 2, 3], [4, 5, 6]])
     assert [weather.parameters["route_percentage"] for weather in route.weathers] == [0.0, 100.0]
+    assert route.scenarios == (RouteScenario("a", "Accident", 1.0, 2.0, 3.0, 0.0),)
 
 
 coordinates = st.floats(-1e6, 1e6)
@@ -79,6 +81,15 @@ specs = st.builds(
             RouteWeather,
             name=st.sampled_from(["", "ClearNoon"]),
             parameters=st.dictionaries(st.sampled_from(["cloudiness", "wetness"]), coordinates),
+        ),
+        max_size=2,
+    ).map(tuple),
+    scenarios=st.lists(
+        st.builds(
+            RouteScenario,
+            st.sampled_from(["", "ControlLoss_1"]),
+            st.sampled_from(["ControlLoss", "ParkingExit"]),
+            *[coordinates] * 4,
         ),
         max_size=2,
     ).map(tuple),
@@ -114,6 +125,14 @@ def test_the_layout_of_leaderboard_2_keeps_places_and_loses_angles(tmp_path: Pat
         (
             f'<routes><route id="1" town="T">{TWO_POINTS.replace("1", "nan")}</route></routes>',
             "finite number for 'x' of <waypoint>, got 'nan'",
+        ),
+        (
+            f'<routes><route id="1" town="T"><weather wetness="w"/>{TWO_POINTS}</route></routes>',
+            "finite number for 'wetness' of <weather>, got 'w'",
+        ),
+        (
+            f'<routes><route id="1" town="T"><scenario type="A"/>{TWO_POINTS}</route></routes>',
+            "expected <scenario name=… type=…><trigger_point",
         ),
         (
             f'<routes><route id="1" town="T">{TWO_POINTS.replace("z=", "w=")}</route></routes>',

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-import di_envs.suites
+import di_envs.planned_routes
 from agents.expert.agent import Expert
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera.cameras import CameraRig
@@ -97,10 +97,14 @@ def test_agent_environment_and_route_are_made_once(filmed, silent, tmp_path, mon
 
     count(RouteEnv, "__init__")
     count(Expert, "__init__")
-    count(di_envs.suites, "plan_route")
+    count(di_envs.planned_routes, "plan_route")
     record = drive(SPEC, seed=2, console=silent, video=tmp_path / "one.gif" if filmed else None)
     assert record.route_id == ROUTE
-    assert sorted(made) == ["Expert.__init__", "RouteEnv.__init__", "di_envs.suites.plan_route"]
+    assert sorted(made) == [
+        "Expert.__init__",
+        "RouteEnv.__init__",
+        "di_envs.planned_routes.plan_route",
+    ]
 
 
 HIDING_AGENT = '''
