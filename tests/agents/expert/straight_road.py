@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from agents.expert.surroundings import Actors, Lights, Ways
 
 from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertConfig
 from agents.expert.decision import decide, start_progress
 from agents.expert.path import DrivePath
 from agents.expert.progress import Progress
-from agents.expert.surroundings import Actors, Lights, Ways
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import EgoModel, longitudinal_acceleration
 from di_envs.world.state import PATH_LANES, ActorKind

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from agents.expert.surroundings import Actors, Lights
 
 from agents.expert.agent import Expert
 from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertConfig
 from agents.expert.path import build_path
 from agents.expert.people import WARY_MPS, WARY_MPS2
-from agents.expert.surroundings import Actors, Lights
 from di_envs.suites import choose_suite
 from di_envs.town.lanes import LightState
 from di_envs.town.loading import load_town
