@@ -100,9 +100,7 @@ def crossings_of(path: DrivePath, town: Town) -> Crossings:
     streams = list(zip(*builder.rows, strict=True)) or [()] * 7
     points = np.concatenate([np.zeros((0, 4)), *builder.pieces])
     crossings = Crossings(
-        own_rank=np.array(
-            [_own_rank(lanes, town.signals, path, leg) for leg in range(legs_in(path))], np.int8
-        ),
+        own_rank=_own_ranks(path, town),
         meet_start=start,
         stream=np.array(columns[1], np.int32),
         begin_m=np.array(columns[2], np.float64),
