@@ -86,7 +86,7 @@ class _Builder:
 
 def crossings_of(path: DrivePath, town: Town) -> Crossings:
     """Where others may cross a path, and on which ways they come."""
-    lanes, builder = town.lanes, _Builder(town)
+    builder = _Builder(town)
     meets: list[tuple[int, int, float, float, float, float]] = []
     first = 0
     for leg, junction in enumerate(path.leg_junction):

@@ -29,7 +29,7 @@ FORECAST_M = 100
 LONGEST_CHANGE_M = 45.0
 SHORTEST_CHANGE_M = 8.0
 BEFORE_CHANGE_S = 3.0  # gaps are looked for from this time before a change may begin
-STANDS_MPS = 0.1
+STANDS_MPS, DRIVES_MPS = 0.1, 2.0
 MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls back
 
 
@@ -58,9 +58,17 @@ def update_progress(
         line,
         stood_s,
         progress.waiting_s,
-        progress.still_s + numbers.dt_s if speed < STANDS_MPS else 0.0,
+        _seconds_still(progress.still_s, speed, numbers.dt_s),
         seconds_yellow(path, progress.line, line, progress.yellow_s, visible, numbers.dt_s),
     )
+
+
+@kernel
+def _seconds_still(still_s: float, speed: float, dt_s: float) -> float:
+    """For how long the car has stood, until it really drives again."""
+    if speed < STANDS_MPS:
+        return still_s + dt_s
+    return still_s if speed < DRIVES_MPS else 0.0
 
 
 @kernel

@@ -59,8 +59,10 @@ def note_hiding_place(
     distance = seen.station_m + length - progress.station_m - visible.half_length[CAR]
     if gap < 0.0 or distance < 0.0:
         return  # on the path, or passed
-    allowed = passing_speed(gap + BODY_M, numbers)
     speed = visible.speed[CAR]
+    if distance + BODY_M < speed * gap / numbers.runner_mps:
+        return  # it is past before anybody could be in its way
+    allowed = passing_speed(gap, numbers)
     reachable = math.sqrt(allowed * allowed + 2.0 * numbers.braking_mps2 * distance)
     wanted = (reachable - speed) / numbers.dt_s
     sight.number[BEST] = min(sight.number[BEST], max(wanted, -BRAKING_MPS2))

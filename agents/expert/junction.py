@@ -168,8 +168,8 @@ def _meets(
     if to_leave <= 0.0:
         return False
     to_enter = crossings.other_begin_m[meet] - length - station_m
-    if speed < STANDS_MPS and to_enter > 0.0 and progress.still_s > PATIENT_S:
-        return False  # both stand: the car takes its turn
+    if speed < STANDS_MPS and progress.still_s > PATIENT_S:
+        return False  # both stand: the car takes its turn; who is on its path is a leader
     enters = time_over(to_enter, speed, SOON_MPS2)
     leaves = time_over(to_leave, speed, LATE_MPS2)
     arrives = time_to(times, crossings.begin_m[meet] - half - progress.station_m)

@@ -11,13 +11,14 @@ from agents.expert.config import ExpertNumbers
 from agents.expert.path import DrivePath
 from agents.expert.progress import Progress
 from agents.expert.sight import BEST, Seen, Sight
-from agents.expert.speed import stop_within, time_to
+from agents.expert.speed import braking_needed, stop_within, time_to
 from agents.expert.visible import CAR, Visible
 from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.state import ActorKind
 
 AHEAD_OF_WALKER_S = 1.2  # by which the car is gone before somebody steps onto its path
+TOO_LATE_MPS2 = 7.0  # who would have to brake harder than this does not stop for him
 SPARE_S = 0.5  # kept between somebody's leaving the path and the expert's arrival
 LOOK_S = 6.0
 STANDS_MPS = 0.1  # who is slower than this stands
@@ -71,11 +72,12 @@ def _note_crossing(
     along = visible.speed[seen.row] * math.cos(seen.turn_rad)
     half, body = visible.half_length[CAR], visible.half_length[seen.row]
     reach = visible.half_width[CAR] + body + numbers.walker_margin_m
-    enters, leaves = 0.0, LOOK_S
+    enters, leaves, slack = 0.0, LOOK_S, 0.0
     if abs(across) > 0.2:
         towards = -math.copysign(offset, offset * across)  # positive while coming nearer
         enters = max((towards - reach) / abs(across), 0.0)
         leaves = (towards + reach) / abs(across)
+        slack = numbers.walker_margin_m / abs(across)
     if (abs(offset) >= reach and abs(across) <= 0.2) or leaves <= 0.0 or enters > LOOK_S:
         return
     meeting = station + along * min(enters, 2.0)
@@ -88,6 +90,8 @@ def _note_crossing(
     gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
     if arrives > leaves + SPARE_S or gone + AHEAD_OF_WALKER_S < enters:
         return
+    if gone < enters + slack and braking_needed(distance, visible.speed[CAR]) > TOO_LATE_MPS2:
+        return  # it can no longer stop, but it is past before he is there
     stop = stop_within(distance - numbers.walker_gap_m, visible.speed[CAR], numbers)
     sight.number[BEST] = min(sight.number[BEST], stop)
 
