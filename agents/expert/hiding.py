@@ -60,7 +60,7 @@ def note_hiding_place(
     if gap < 0.0 or distance < 0.0:
         return  # on the path, or passed
     speed = visible.speed[CAR]
-    if distance + BODY_M < speed * gap / numbers.runner_mps:
+    if distance + BODY_M + visible.half_length[CAR] < speed * gap / numbers.runner_mps:
         return  # it is past before anybody could be in its way
     allowed = passing_speed(gap, numbers)
     reachable = math.sqrt(allowed * allowed + 2.0 * numbers.braking_mps2 * distance)

@@ -90,8 +90,9 @@ def _note_crossing(
     gone = time_to(times, meeting + body + half + 0.5 - progress.station_m)
     if arrives > leaves + SPARE_S or gone + AHEAD_OF_WALKER_S < enters:
         return
-    if gone < enters + slack and braking_needed(distance, visible.speed[CAR]) > TOO_LATE_MPS2:
-        return  # it can no longer stop, but it is past before he is there
+    passed = time_to(times, meeting + body - progress.station_m)
+    if passed < enters + slack and braking_needed(distance, visible.speed[CAR]) > TOO_LATE_MPS2:
+        return  # it can no longer stop, but its middle is past him before he is there
     stop = stop_within(distance - numbers.walker_gap_m, visible.speed[CAR], numbers)
     sight.number[BEST] = min(sight.number[BEST], stop)
 

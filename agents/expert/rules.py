@@ -101,7 +101,7 @@ def light_acceleration(
     distance = line_m - station_m - half_length
     over = line_m + TAIL_M + half_length  # where the centre is once the tail is over
     if distance < -PAST_LINE_M:
-        if time_to(times, over - station_m) + numbers.red_margin_s <= left:
+        if colour == _GREEN or time_to(times, over - station_m) + numbers.red_margin_s <= left:
             return NO_LIMIT_MPS2
         return _between_line_and_tail(line_m - station_m, half_length, speed)
     room = queue[0] - numbers.standstill_gap_m - over - half_length
