@@ -71,17 +71,20 @@ def collect_hiders(
     Returns:
         How many of each.
     """
-    x, y, n, m = state.x[ego], state.y[ego], 0, 0
-    for actor in range(state.kind.size):
-        if actor == ego or state.kind[actor] == _ABSENT or state.kind[actor] == _DEBRIS:
+    kind, xs, ys, half_width = state.kind, state.x, state.y, state.half_width
+    x, y, n, m = xs[ego], ys[ego], 0, 0
+    for actor in range(kind.size):
+        if actor == ego or kind[actor] == _ABSENT or kind[actor] == _DEBRIS:
             continue
-        dx, dy = state.x[actor] - x, state.y[actor] - y
-        if state.half_width[actor] >= THIN_M and dx * dx + dy * dy < range_m * range_m:
+        dx, dy = xs[actor] - x, ys[actor] - y
+        if half_width[actor] >= THIN_M and dx * dx + dy * dy < range_m * range_m:
             bodies[n] = actor
             n += 1
-    for wall in range(buildings.x.size):
-        reach = range_m + buildings.half_length[wall] + buildings.half_width[wall]
-        dx, dy = buildings.x[wall] - x, buildings.y[wall] - y
+    wall_x, wall_y = buildings.x, buildings.y
+    wall_length, wall_width = buildings.half_length, buildings.half_width
+    for wall in range(wall_x.size):
+        reach = range_m + wall_length[wall] + wall_width[wall]
+        dx, dy = wall_x[wall] - x, wall_y[wall] - y
         if dx * dx + dy * dy < reach * reach:
             walls[m] = wall
             m += 1

@@ -23,12 +23,12 @@ from di_envs.world.state import ActorKind, State
 
 CAR = 0  # the row of the car itself
 RANGE_M = 100.0  # within which others are seen
+POLES_M = 50.0  # and poles
 LIGHTS_M = 150.0  # and lights
 ON_LANE_M, ALONG_LANE_RAD = 2.0, 0.6  # within which a cyclist rides along a lane
 
-_ABSENT, _BICYCLE, _DEBRIS = (
-    int(kind) for kind in (ActorKind.ABSENT, ActorKind.BICYCLE, ActorKind.DEBRIS)
-)
+_ABSENT, _BICYCLE = int(ActorKind.ABSENT), int(ActorKind.BICYCLE)
+_PROP, _DEBRIS = int(ActorKind.PROP), int(ActorKind.DEBRIS)
 
 
 @by_reference
@@ -55,22 +55,22 @@ class Visible(NamedTuple):
 
 
 def empty_visible(actors: int, signals: int) -> Visible:
-    """Room for what is seen."""
+    """Room for what is seen; nothing is yet, and what the rows hold means nothing."""
     return Visible(
         seen=np.zeros(1, np.int64),
-        kind=np.zeros(actors, np.int8),
-        x=np.zeros(actors),
-        y=np.zeros(actors),
-        z=np.zeros(actors),
-        yaw=np.zeros(actors),
-        speed=np.zeros(actors),
-        half_length=np.zeros(actors),
-        half_width=np.zeros(actors),
-        height=np.zeros(actors),
-        brake_light=np.zeros(actors, np.int8),
-        indicator=np.zeros(actors, np.int8),
-        along_lane=np.zeros(actors, np.int8),
-        light=np.zeros(signals, np.int8),
+        kind=np.empty(actors, np.int8),
+        x=np.empty(actors),
+        y=np.empty(actors),
+        z=np.empty(actors),
+        yaw=np.empty(actors),
+        speed=np.empty(actors),
+        half_length=np.empty(actors),
+        half_width=np.empty(actors),
+        height=np.empty(actors),
+        brake_light=np.empty(actors, np.int8),
+        indicator=np.empty(actors, np.int8),
+        along_lane=np.empty(actors, np.int8),
+        light=np.empty(signals, np.int8),
     )
 
 
@@ -95,27 +95,35 @@ def see(
         through_walls: Whether nobody hides anybody from it.
         visible: Overwritten.
     """
-    bodies = np.empty(state.kind.size, np.int32)
+    kind, x, y = state.kind, state.x, state.y
+    bodies = np.empty(kind.size, np.int32)
     walls = np.empty(buildings.x.size, np.int32)
     n, m = collect_hiders(state, buildings, ego, RANGE_M, bodies, walls)
     bodies, walls = bodies[:n], walls[:m]
     _show(state, lanes, ego, visible, CAR)
-    row = CAR + 1
-    for actor in range(state.kind.size):
-        if actor == ego or state.kind[actor] == _ABSENT or state.kind[actor] == _DEBRIS:
+    row, ego_x, ego_y = CAR + 1, x[ego], y[ego]
+    for actor in range(kind.size):
+        if actor == ego or kind[actor] == _ABSENT or kind[actor] == _DEBRIS:
             continue
-        dx, dy = state.x[actor] - state.x[ego], state.y[actor] - state.y[ego]
-        if dx * dx + dy * dy > RANGE_M * RANGE_M:
+        dx, dy = x[actor] - ego_x, y[actor] - ego_y
+        reach = POLES_M if kind[actor] == _PROP else RANGE_M
+        if dx * dx + dy * dy > reach * reach:
             continue
-        if not through_walls and is_hidden(state, buildings, ego, actor, bodies, walls):
-            continue
+        if not through_walls and kind[actor] != _PROP:  # the map knows the poles
+            if is_hidden(state, buildings, ego, actor, bodies, walls):
+                continue
         _show(state, lanes, actor, visible, row)
         row += 1
     visible.seen[0] = row
-    for signal in range(visible.light.size):
-        dx, dy = signals.pose[signal, 0] - state.x[ego], signals.pose[signal, 1] - state.y[ego]
-        near = dx * dx + dy * dy < LIGHTS_M * LIGHTS_M
-        visible.light[signal] = state.light[signal] if near else 0
+    _show_lights(state.light, signals.pose, ego_x, ego_y, visible.light)
+
+
+@kernel
+def _show_lights(light: Int8, pose: Float64, x: float, y: float, out: Int8) -> None:
+    """Copies the colours of the lights (S,) at poses (S, 4) that are near a place."""
+    for signal in range(light.size):
+        dx, dy = pose[signal, 0] - x, pose[signal, 1] - y
+        out[signal] = light[signal] if dx * dx + dy * dy < LIGHTS_M * LIGHTS_M else 0
 
 
 @kernel

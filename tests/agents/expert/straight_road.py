@@ -114,6 +114,8 @@ def make_actors(others: int = 0) -> Visible:
     There is one light, and it is green.
     """
     actors = empty_visible(1 + others, 1)
+    for column in actors:
+        column[...] = 0
     actors.seen[0] = 1 + others
     actors.kind[:] = ActorKind.CAR
     actors.x[1:] = -1e4
