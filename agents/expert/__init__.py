@@ -1,9 +1,10 @@
-"""The agent `expert`: rules over the true state of the world, as kernels.
+"""The agent `expert`: rules over what is visible from its car, as kernels.
 
     legs -> base_line, target_speed -> path       the line to drive, made once a route
-    surroundings                                  what kernels read of the world
+    crossings                                     the ways that cross it, from the map
+    occlusion -> visible                          what is in sight: all that is decided from
     progress                                      where the car is on the path, and its memory
-    sight, people, actors                         who is on the path, beside it, at the junction
+    sight, people, hiding, actors                 who is on the path and beside it, what hides whom
     speed, rules, junction                        accelerations that all of these allow
     decision, control                             the least of them, and the wheel: one decision
     agent                                         the agent around the kernels

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertNumbers
+from agents.expert.hiding import note_hiding_place
 from agents.expert.junction import JunctionAhead
 from agents.expert.path import DrivePath
 from agents.expert.people import SPARE_S, is_on_foot, note_person
@@ -23,7 +24,7 @@ from agents.expert.sight import (
     Sight,
 )
 from agents.expert.speed import follow
-from agents.expert.surroundings import Actors, Ways
+from agents.expert.visible import CAR, Visible
 from di_envs.numerics.arrays import Float64
 from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.kernels import kernel
@@ -34,15 +35,15 @@ LOOK_M, LOOK_S = 35.0, 4.0  # others are looked at within this and the way drive
 BACK_M = 60.0  # of path behind the car, where followers are
 CROSSING_RAD = 0.6  # whoever stands at more than this angle to the path crosses it
 LEADER_BRAKING_MPS2 = 8.0  # what the vehicle ahead may do
+DRIFT_RAD = 0.02  # of heading to the side of the indicator, from which on a change is under way
+CHANGE_M = 3.0  # to the side, where it leads
 BLOCKED_GAP_M = 1.5
 # Behind a leader, that a change to the next lane takes from standstill: on the shortest change the
 # car's front swings out beside a lorry with 0.3 m to spare, as its rear axle follows the path
 PULL_OUT_M = 6.0
 PATIENT_S = 4.0  # of waiting for a gap, after which a smaller one will do
 
-_ABSENT, _PROP, _DEBRIS = (
-    int(kind) for kind in (ActorKind.ABSENT, ActorKind.PROP, ActorKind.DEBRIS)
-)
+_PROP = int(ActorKind.PROP)
 
 
 @kernel
@@ -64,42 +65,41 @@ class Shadow(NamedTuple):
     rear_m: float  # stations of the path
     front_m: float
     half_width_m: float  # across the path
-    offset_m: float  # of its middle, from the lane that it is on …
-    aside_m: float  # … and from the one that it leaves, while it changes lanes
+    offset_m: float  # of its middle …
+    aside_m: float  # … and where a change of lanes will lead it
     along_mps: float
     across_mps: float
 
 
 @kernel
-def _shadow_of(actors: Actors, seen: Seen) -> Shadow:
+def _shadow_of(visible: Visible, seen: Seen) -> Shadow:
     """A vehicle laid onto the path.
 
-    One that changes lanes counts on the lane that it leaves and on the one that it enters.
+    One that changes lanes counts where it is and where its indicator and its heading lead it.
     """
-    actor = seen.actor
+    row = seen.row
     cos, sin = math.cos(seen.turn_rad), math.sin(seen.turn_rad)
-    half_length, half_width = actors.half_length[actor], actors.half_width[actor]
+    half_length, half_width = visible.half_length[row], visible.half_width[row]
     length = half_length * abs(cos) + half_width * abs(sin)
     aside = seen.offset_m
-    if actors.changing_from[actor] >= 0:
-        aside = seen.offset_m - actors.lateral_m[actor]
+    if visible.indicator[row] * seen.turn_rad > DRIFT_RAD and abs(seen.turn_rad) < CROSSING_RAD:
+        aside += visible.indicator[row] * CHANGE_M
     return Shadow(
         seen.station_m - length,
         seen.station_m + length,
         half_length * abs(sin) + half_width * abs(cos),
         seen.offset_m,
         aside,
-        actors.speed[actor] * cos,
-        actors.speed[actor] * sin,
+        visible.speed[row] * cos,
+        visible.speed[row] * sin,
     )
 
 
 @kernel
 def _note_vehicle(
     sight: Sight,
-    actors: Actors,
+    visible: Visible,
     seen: Seen,
-    ego: int,
     progress: Progress,
     shift: float,
     ahead: JunctionAhead,
@@ -109,25 +109,24 @@ def _note_vehicle(
 
     Args:
         sight: What the car knows so far; changed.
-        actors: Everybody.
+        visible: What is in sight.
         seen: The vehicle.
-        ego: The car.
         progress: Where the car is on the path.
         shift: As of `look`.
         ahead: The next junction.
         numbers: From `ExpertConfig`.
     """
-    shadow = _shadow_of(actors, seen)
-    if shift != 0.0 and _is_beside(shadow, shift, actors.half_width[ego]):
-        _note_gap(sight, actors, ego, shadow, progress, numbers)
-    reach = actors.half_width[ego] + shadow.half_width_m
-    if actors.kind[seen.actor] < _PROP:  # poles stand close to where one drives, and stay there
+    shadow = _shadow_of(visible, seen)
+    if shift != 0.0 and _is_beside(shadow, shift, visible.half_width[CAR]):
+        _note_gap(sight, visible, shadow, progress, numbers)
+    reach = visible.half_width[CAR] + shadow.half_width_m
+    if visible.kind[seen.row] < _PROP:  # poles stand close to where one drives, and stay there
         reach += numbers.side_margin_m
     on_path = min(abs(shadow.offset_m), abs(shadow.aside_m)) < reach
     if not on_path or shadow.front_m <= progress.station_m:
         return
-    speed = actors.speed[ego]
-    gap = shadow.rear_m - progress.station_m - actors.half_length[ego]
+    speed = visible.speed[CAR]
+    gap = shadow.rear_m - progress.station_m - visible.half_length[CAR]
     if shift != 0.0 and shadow.along_mps < speed + 1.0:  # it must pull out behind this one
         if gap < PULL_OUT_M:
             sight.number[FRONT_OK] = 0.0
@@ -135,7 +134,7 @@ def _note_vehicle(
     if abs(seen.turn_rad) > CROSSING_RAD and _is_gone_by_then(shadow, reach, gap, speed):
         return
     _note_leader(sight, shadow, gap, speed, numbers)
-    _note_room(sight, shadow, 2.0 * actors.half_length[seen.actor], ahead, numbers)
+    _note_room(sight, shadow, 2.0 * visible.half_length[seen.row], ahead, numbers)
 
 
 @kernel
@@ -183,14 +182,13 @@ def _note_room(
 @kernel
 def _note_gap(
     sight: Sight,
-    actors: Actors,
-    ego: int,
+    visible: Visible,
     shadow: Shadow,
     progress: Progress,
     numbers: ExpertNumbers,
 ) -> None:
     """Whether a vehicle on the lane to change to leaves the gap free."""
-    speed, half, along = actors.speed[ego], actors.half_length[ego], shadow.along_mps
+    speed, half, along = visible.speed[CAR], visible.half_length[CAR], shadow.along_mps
     ahead = shadow.rear_m - progress.station_m - half
     behind = progress.station_m - half - shadow.front_m
     if shadow.rear_m + shadow.front_m > 2.0 * progress.station_m:
@@ -211,9 +209,7 @@ def look(
     sight: Sight,
     path: DrivePath,
     progress: Progress,
-    actors: Actors,
-    ways: Ways,
-    ego: int,
+    visible: Visible,
     shift: float,
     ahead: JunctionAhead,
     times: Float64,
@@ -225,41 +221,27 @@ def look(
         sight: From `blank_sight`; filled.
         path: The route's path.
         progress: Where the car is on it.
-        actors: Everybody.
-        ways: The town's lanes.
-        ego: The car.
+        visible: What is in sight.
         shift: Offset of the present lane from the one to change to next [m], 0 where none is due.
         ahead: The next junction.
         times: From `forecast`.
         numbers: From `ExpertConfig`.
     """
-    reach = LOOK_M + LOOK_S * actors.speed[ego]
+    reach = LOOK_M + LOOK_S * visible.speed[CAR]
     here = int(progress.station_m / STEP_M)
     begin = max(here - int(BACK_M / STEP_M), 0)
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
-    for actor in range(actors.kind.size):
-        if actor == ego or actors.kind[actor] in (_ABSENT, _DEBRIS):
-            continue
-        dx, dy = actors.x[actor] - actors.x[ego], actors.y[actor] - actors.y[ego]
+    for row in range(CAR + 1, visible.seen[0]):
+        dx, dy = visible.x[row] - visible.x[CAR], visible.y[row] - visible.y[CAR]
         if dx * dx + dy * dy > reach * reach:
             continue
-        station, offset, yaw = project(path, progress, actors.x[actor], actors.y[actor], begin, end)
+        station, offset, yaw = project(path, progress, visible.x[row], visible.y[row], begin, end)
         # Levels are those of the path there: roads climb.
-        if abs(actors.z[actor] - height_at(path, station)) > LEVEL_M:
+        if abs(visible.z[row] - height_at(path, station)) > LEVEL_M:
             continue
-        seen = Seen(actor, station, offset, wrap_angle(actors.yaw[actor] - yaw))
-        if is_on_foot(actors, actor):
-            note_person(sight, actors, seen, ego, progress, times, numbers)
+        seen = Seen(row, station, offset, wrap_angle(visible.yaw[row] - yaw))
+        if is_on_foot(visible, row):
+            note_person(sight, path, visible, seen, progress, times, numbers)
             continue
-        _note_vehicle(sight, actors, seen, ego, progress, shift, ahead, numbers)
-        way = actors.grant[actor]
-        if way >= 0 and ways.junction[way] == ahead.junction:
-            _note_holder(sight, actor)
-
-
-@kernel
-def _note_holder(sight: Sight, actor: int) -> None:
-    """Remembers somebody who may cross the next junction, as long as there is room for him."""
-    if sight.holders[0] < sight.holder.size:
-        sight.holder[sight.holders[0]] = actor
-        sight.holders[0] += 1
+        note_hiding_place(sight, visible, seen, progress, numbers)
+        _note_vehicle(sight, visible, seen, progress, shift, ahead, numbers)

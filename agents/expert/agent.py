@@ -1,41 +1,58 @@
-"""The agent `expert`: rules over the true state of the world, the reference that others are put to.
+"""The agent `expert`: rules over what is visible from its car, the reference others are put to.
 
 It follows its route's lanes on a smooth path, changes lanes where the route does and a gap is free,
 keeps gaps, stops at red lights and stop signs, enters junctions only when nobody crosses and
-the exit has room, and stops for walkers. It sees everything (track PRIVILEGED) and hides nothing:
-its memory is a value.
+the exit has room, and stops for walkers. It measures without error whatever it sees (track
+PRIVILEGED), but it decides from `Visible` alone. Its memory is a value.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from agents.base import Control, Observation, Requirements, WorldView
 from agents.expert.config import ExpertConfig
+from agents.expert.crossings import Crossings, crossings_of
 from agents.expert.decision import decide, start_progress
+from agents.expert.occlusion import Buildings, buildings_of
 from agents.expert.path import DrivePath, build_path
 from agents.expert.progress import Progress
-from agents.expert.surroundings import actors_of, lights_of, ways_of
+from agents.expert.visible import empty_visible, see
 from di_envs.town.plan import RoutePlan
 from di_envs.world.dynamics import EgoModel
 
 
+class Known(NamedTuple):
+    """What is known of a route before it is driven."""
+
+    path: DrivePath
+    crossings: Crossings
+    buildings: Buildings
+
+
 @dataclass(frozen=True, kw_only=True)
 class ExpertMemory:
-    """The route, the path made of it at the first decision, and the progress along it."""
+    """The route, what the map says of it from the first decision on, and the progress along it."""
 
     plan: RoutePlan
-    path: DrivePath | None = None
+    known: Known | None = None
     progress: Progress | None = None
+
+    @property
+    def path(self) -> DrivePath | None:
+        """The path made of the route."""
+        return self.known.path if self.known else None
 
 
 class Expert:
-    """A careful and brisk driver with full knowledge.
+    """A careful and brisk driver.
 
     Args:
+        told: Know where somebody will step out, and see through buildings and vehicles.
         ignore_actors: Drive as if nobody else were there.
         ignore_lights: Drive as if there were no traffic lights.
         ignore_signs: Drive as if there were no stop signs.
@@ -48,6 +65,7 @@ class Expert:
     def __init__(
         self,
         *,
+        told: bool = False,
         ignore_actors: bool = False,
         ignore_lights: bool = False,
         ignore_signs: bool = False,
@@ -60,6 +78,7 @@ class Expert:
             ignore_lights=ignore_lights,
             ignore_signs=ignore_signs,
         )
+        self._told = told
         self._numbers = self.config.numbers()
         self._model = (model or EgoModel()).parameters()
 
@@ -70,22 +89,21 @@ class Expert:
     def act(self, observation: Observation, memory: ExpertMemory) -> tuple[Control, ExpertMemory]:
         """One decision. `observation["world"]` is the read-only view of the world."""
         view: WorldView = observation["world"]
-        path, progress = memory.path, memory.progress
-        if path is None or progress is None:
-            path = build_path(memory.plan, view.town, self.config)
-            progress = start_progress()
+        known, progress = memory.known, memory.progress
+        if known is None or progress is None:
+            known, progress = self._look_at_map(memory.plan, view), start_progress()
+        state, town = view.state, view.town
+        visible = empty_visible(state.kind.size, state.light.size)
+        see(state, town.lanes, town.signals, known.buildings, view.ego, self._told, visible)
         throttle, steer, brake, progress = decide(
-            path,
-            progress,
-            actors_of(view.state),
-            ways_of(view.town.lanes),
-            lights_of(view.state, view.town.signals),
-            view.ego,
-            self._numbers,
-            self._model,
+            known.path, progress, known.crossings, visible, self._numbers, self._model
         )
         control = np.array([throttle, steer, brake], dtype=np.float32)
-        return control, ExpertMemory(plan=memory.plan, path=path, progress=progress)
+        return control, ExpertMemory(plan=memory.plan, known=known, progress=progress)
+
+    def _look_at_map(self, plan: RoutePlan, view: WorldView) -> Known:
+        path = build_path(plan, view.town, self.config, self._told)
+        return Known(path, crossings_of(path, view.town), buildings_of(view.town))
 
     def close(self) -> None:
         """There is nothing to free."""

@@ -23,6 +23,8 @@ class ExpertNumbers(NamedTuple):
     walker_margin_m: float
     walker_gap_m: float
     wary_mps: float
+    kerb_sight_m: float
+    runner_mps: float
     exit_gap_m: float
     clear_before_s: float
     clear_after_s: float
@@ -52,7 +54,9 @@ class ExpertConfig:
     red_margin_s: float = 0.4  # the tail is over the line this long before red
     walker_margin_m: float = 0.7  # added to each side of the car for walkers
     walker_gap_m: float = 2.5  # between the front and a walker
-    wary_mps: float = 9.0  # where the plan says that somebody hides beside the road
+    wary_mps: float = 9.0  # where it is told that somebody hides beside the road
+    kerb_sight_m: float = 10.0  # before the car, where somebody may step off a walkway
+    runner_mps: float = 4.0  # how fast he may run
     exit_gap_m: float = 2.0  # room kept free behind those beyond a junction
     clear_before_s: float = 0.4  # another has left a crossing this long before the expert comes
     clear_after_s: float = 1.2  # the expert has left it this long before another comes

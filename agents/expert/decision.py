@@ -7,10 +7,11 @@ import numpy as np
 from agents.expert.actors import look
 from agents.expert.config import ExpertNumbers
 from agents.expert.control import steering
+from agents.expert.crossings import Crossings
 from agents.expert.junction import crossing_acceleration, exit_acceleration, junction_ahead
 from agents.expert.path import CHANGE_END_M, CHANGE_ROOM_M, DrivePath
 from agents.expert.progress import Progress, localise
-from agents.expert.rules import line_acceleration, next_line, stands_at
+from agents.expert.rules import line_acceleration, next_line, seconds_yellow, stands_at
 from agents.expert.sight import (
     BEST,
     FRONT_OK,
@@ -20,7 +21,7 @@ from agents.expert.sight import (
     blank_sight,
 )
 from agents.expert.speed import cruise, forecast, stop_within
-from agents.expert.surroundings import Actors, Lights, Ways
+from agents.expert.visible import CAR, Visible
 from di_envs.numerics.kernels import kernel
 from di_envs.world.dynamics import EgoParameters, pedals
 
@@ -28,27 +29,23 @@ FORECAST_M = 100
 LONGEST_CHANGE_M = 45.0
 SHORTEST_CHANGE_M = 8.0
 BEFORE_CHANGE_S = 3.0  # gaps are looked for from this time before a change may begin
+STANDS_MPS, DRIVES_MPS = 0.1, 2.0
 MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls back
 
 
 @kernel
 def start_progress() -> Progress:
     """The memory at a path's start."""
-    return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0)
+    return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
 def update_progress(
-    path: DrivePath,
-    progress: Progress,
-    x: float,
-    y: float,
-    speed: float,
-    half_length: float,
-    numbers: ExpertNumbers,
+    path: DrivePath, progress: Progress, visible: Visible, numbers: ExpertNumbers
 ) -> Progress:
     """The memory, brought up to where the car is now."""
-    station, _, _ = localise(path, progress, x, y)
+    speed, half_length = visible.speed[CAR], visible.half_length[CAR]
+    station, _, _ = localise(path, progress, visible.x[CAR], visible.y[CAR])
     line = next_line(path, progress.line, station - half_length)
     stood_s = progress.stood_s if line == progress.line else 0.0
     if stands_at(path, line, station + half_length, speed):
@@ -61,7 +58,17 @@ def update_progress(
         line,
         stood_s,
         progress.waiting_s,
+        _seconds_still(progress.still_s, speed, numbers.dt_s),
+        seconds_yellow(path, progress.line, line, progress.yellow_s, visible, numbers.dt_s),
     )
+
+
+@kernel
+def _seconds_still(still_s: float, speed: float, dt_s: float) -> float:
+    """For how long the car has stood, until it really drives again."""
+    if speed < STANDS_MPS:
+        return still_s + dt_s
+    return still_s if speed < DRIVES_MPS else 0.0
 
 
 @kernel
@@ -96,6 +103,8 @@ def begin_change(
             progress.line,
             progress.stood_s,
             waiting,
+            progress.still_s,
+            progress.yellow_s,
         )
     room = path.change_limit_m[k] - CHANGE_END_M - progress.station_m
     if k + 1 < path.change_jump_m.size and path.change_jump_m[k + 1] < path.change_limit_m[k]:
@@ -103,7 +112,15 @@ def begin_change(
     wanted = min(max(numbers.change_time_s * speed, CHANGE_ROOM_M), LONGEST_CHANGE_M)
     length = max(min(wanted, room), SHORTEST_CHANGE_M)
     return Progress(
-        progress.station_m, k + 1, progress.station_m, length, progress.line, progress.stood_s, 0.0
+        progress.station_m,
+        k + 1,
+        progress.station_m,
+        length,
+        progress.line,
+        progress.stood_s,
+        0.0,
+        progress.still_s,
+        progress.yellow_s,
     )
 
 
@@ -123,10 +140,8 @@ def wait_for_gap(
 def decide(
     path: DrivePath,
     progress: Progress,
-    actors: Actors,
-    ways: Ways,
-    lights: Lights,
-    ego: int,
+    crossings: Crossings,
+    visible: Visible,
     numbers: ExpertNumbers,
     model: EgoParameters,
 ) -> tuple[float, float, float, Progress]:
@@ -135,24 +150,24 @@ def decide(
     Args:
         path: The route's path.
         progress: The memory.
-        actors, ways, lights: What is seen of the world (`surroundings`), only read.
-        ego: Index of the ego.
+        crossings: Who may cross it, and where.
+        visible: What is in sight.
         numbers: From `ExpertConfig`.
         model: From `EgoModel`.
 
     Returns:
         (throttle, steer, brake, memory).
     """
-    x, y, yaw = actors.x[ego], actors.y[ego], actors.yaw[ego]
-    speed, half = actors.speed[ego], actors.half_length[ego]
-    progress = update_progress(path, progress, x, y, speed, half, numbers)
+    x, y, yaw = visible.x[CAR], visible.y[CAR], visible.yaw[CAR]
+    speed, half = visible.speed[CAR], visible.half_length[CAR]
+    progress = update_progress(path, progress, visible, numbers)
     times = np.empty(FORECAST_M)
     forecast(path, progress.station_m, speed, numbers, times)
     ahead = junction_ahead(path, progress, half)
     sight = blank_sight()
     shift = change_due(path, progress, speed)
     if not numbers.ignore_actors:
-        look(sight, path, progress, actors, ways, ego, shift, ahead, times, numbers)
+        look(sight, path, progress, visible, shift, ahead, times, numbers)
     best = min(cruise(path, progress.station_m, speed, numbers), sight.number[BEST])
     if shift != 0.0:
         beside = sight.number[REAR_OK] == 0.0
@@ -161,13 +176,13 @@ def decide(
         if not free:
             best = min(best, wait_for_gap(path, progress, speed, beside, numbers))
     queue = (sight.number[LEADER_REAR], sight.number[LEADER_SPEED])
-    lines = line_acceleration(path, progress, lights, speed, half, times, queue, numbers)
+    lines = line_acceleration(path, progress, visible, speed, half, times, queue, numbers)
     best = min(best, lines)
     if ahead.junction >= 0 and not numbers.ignore_actors:
         front = progress.station_m + half
         best = min(
             best,
-            crossing_acceleration(sight, path, progress, actors, ways, ego, ahead, times, numbers),
+            crossing_acceleration(crossings, progress, visible, ahead, times, numbers),
             exit_acceleration(sight, ahead.begin_m, front, half, speed, numbers),
         )
     best = min(max(best, -numbers.emergency_mps2), numbers.acceleration_mps2)

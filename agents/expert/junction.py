@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import numpy as np
+
 from agents.expert.config import ExpertNumbers
+from agents.expert.crossings import POINT_M, Crossings
 from agents.expert.path import DrivePath
 from agents.expert.progress import Progress
 from agents.expert.rules import PAST_LINE_M
@@ -16,15 +20,33 @@ from agents.expert.speed import (
     time_over,
     time_to,
 )
-from agents.expert.surroundings import Actors, Ways
-from di_envs.numerics.arrays import Float64
+from agents.expert.visible import CAR, Visible
+from di_envs.numerics.arrays import Float64, Int32
+from di_envs.numerics.geometry import wrap_angle
 from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.world.state import PATH_LANES
+from di_envs.town.lanes import LightState, Turn
+from di_envs.world.state import ActorKind
 
 ZONE_MARGIN_M = 0.8  # kept from a crossing place
 SOON_MPS2, LATE_MPS2 = 3.0, 1.0  # others gain speed at most, and at least, this fast
 COMMITTED_MPS2 = 7.0  # who would have to brake harder than this goes on
+LOOK_M = 70.0  # before a junction, from which on the car looks who comes
+MOST_COMERS = 16  # along one stream
+COARSE = 6  # points of a stream that a first look skips
+ASIDE_M, ALONG_RAD, LEVEL_M = 1.7, 0.6, 3.0  # within which somebody is on a stream
+NOWHERE_M = 1e6
+ENTERED_M = 0.3  # with the front this far over the line he goes
+INDICATED_M = 12.0  # before a junction, within which everybody shows where he turns
+AT_SIGN_M = 2.5  # who moves this near a sign's line, and does not brake, has stood there
+STANDS_MPS = 0.3
+RED_BRAKING_MPS2 = 5.5  # who would have to brake harder than this runs a light that is not green
+YIELDING_MPS2 = 3.0  # who can still brake more gently lets the car go first, if it has the right
+PATIENT_S = 2.0  # of standing before a place, after which the car goes before who stands too
+
+_GREEN = int(LightState.GREEN)
+_LEFT, _RIGHT = int(Turn.LEFT), int(Turn.RIGHT)
+_WALKER = int(ActorKind.WALKER)
 
 
 class JunctionAhead(NamedTuple):
@@ -53,91 +75,123 @@ def junction_ahead(path: DrivePath, progress: Progress, half_length: float) -> J
 
 
 @kernel
-def station_on(actors: Actors, ways: Ways, actor: int, way: int) -> float:
-    """Station of a vehicle's centre on a junction lane of its path; negative before it.
-
-    Very large if the vehicle has left it behind or does not go there.
-    """
-    lane, s = actors.lane[actor], actors.lane_m[actor]
-    if lane == way:
-        return s
-    if actors.previous_lane[actor] == way:
-        return ways.length_m[way] + s
-    distance = ways.length_m[lane] - s
-    for step in range(1, PATH_LANES):
-        ahead = actors.path[actor, step]
-        if ahead < 0:
-            break
-        if ahead == way:
-            return -distance
-        distance += ways.length_m[ahead]
-    return 1e6
+def station_on(
+    crossings: Crossings, stream: int, x: float, y: float, z: float, yaw: float
+) -> float:
+    """Station of a place on a stream; `NOWHERE_M` off it, or heading elsewhere."""
+    first, count = crossings.first[stream], crossings.points[stream]
+    nearest, least = 0, math.inf
+    for k in range(0, count, COARSE):
+        dx, dy = x - crossings.x[first + k], y - crossings.y[first + k]
+        square = dx * dx + dy * dy
+        if square < least:
+            nearest, least = k, square
+    if least > (COARSE + ASIDE_M) ** 2:
+        return NOWHERE_M
+    for k in range(max(nearest - COARSE, 0), min(nearest + COARSE + 1, count)):
+        dx, dy = x - crossings.x[first + k], y - crossings.y[first + k]
+        square = dx * dx + dy * dy
+        if square < least:
+            nearest, least = k, square
+    point = first + nearest
+    turn = wrap_angle(yaw - crossings.yaw[point])
+    if least > ASIDE_M * ASIDE_M or abs(turn) > ALONG_RAD or abs(z - crossings.z[point]) > LEVEL_M:
+        return NOWHERE_M
+    cos, sin = math.cos(crossings.yaw[point]), math.sin(crossings.yaw[point])
+    along = cos * (x - crossings.x[point]) + sin * (y - crossings.y[point])
+    return nearest * POINT_M - crossings.back_m[stream] + along
 
 
 @kernel
-def _share_start(ways: Ways, a: int, b: int) -> bool:
-    """Whether two junction lanes begin at the same lane."""
-    for i in range(ways.predecessor_start[a], ways.predecessor_start[a + 1]):
-        for j in range(ways.predecessor_start[b], ways.predecessor_start[b + 1]):
-            if ways.predecessor[i] == ways.predecessor[j]:
-                return True
-    return False
+def will_come(
+    crossings: Crossings, stream: int, visible: Visible, row: int, front_m: float, own_rank: int
+) -> bool:
+    """Whether somebody on a stream looks as if he went through the junction now.
+
+    Args:
+        crossings: Of the path.
+        stream: That he is on.
+        visible: What is in sight.
+        row: His.
+        front_m: Station of his front on the stream.
+        own_rank: The car's.
+    """
+    if front_m > ENTERED_M:
+        return True
+    speed = visible.speed[row]
+    indicator, turn = visible.indicator[row], crossings.turn[stream]
+    wanted = -1 if turn == _LEFT else (1 if turn == _RIGHT else 0)
+    if front_m > -INDICATED_M and indicator != wanted:
+        return False
+    needed = braking_needed(0.5 - front_m, speed)
+    light = crossings.light[stream]
+    if light >= 0 and visible.light[light] > _GREEN:
+        return needed > RED_BRAKING_MPS2
+    if speed < STANDS_MPS:
+        return False
+    braking = visible.brake_light[row] != 0
+    if crossings.sign[stream] != 0:
+        return not braking and front_m > -AT_SIGN_M
+    rank = crossings.rank[stream]
+    if rank > own_rank:
+        return needed > YIELDING_MPS2 and not braking
+    if rank == own_rank and braking:
+        return needed > YIELDING_MPS2
+    return True
 
 
 @kernel
 def _meets(
-    actors: Actors,
-    ways: Ways,
-    actor: int,
-    conflict: int,
-    begin_m: float,
-    end_m: float,
+    crossings: Crossings,
+    meet: int,
+    visible: Visible,
+    row: int,
+    station_m: float,
     progress: Progress,
-    half: float,
     times: Float64,
     numbers: ExpertNumbers,
 ) -> bool:
-    """Whether a vehicle and the car would be in a crossing place at the same time.
+    """Whether somebody and the car would be in a crossing place at the same time.
 
     Args:
-        conflict: Index into the lanes' conflicts.
-        begin_m, end_m: Stations of the crossing place on the car's path.
+        crossings: Of the path.
+        meet: The place.
+        visible: What is in sight.
+        row: His.
+        station_m: His, on the stream.
+        progress: Where the car is on the path.
+        times: From `forecast`.
+        numbers: From `ExpertConfig`.
     """
-    way = ways.conflict_lane[conflict]
-    length, speed = actors.half_length[actor], actors.speed[actor]
-    s = station_on(actors, ways, actor, way)
-    to_leave = ways.conflict_other_end_m[conflict] + length - s
+    length, speed, half = visible.half_length[row], visible.speed[row], visible.half_length[CAR]
+    to_leave = crossings.other_end_m[meet] + length - station_m
     if to_leave <= 0.0:
         return False
-    to_enter = ways.conflict_other_begin_m[conflict] - length - s
+    to_enter = crossings.other_begin_m[meet] - length - station_m
+    if speed < STANDS_MPS and progress.still_s > PATIENT_S:
+        return False  # both stand: the car takes its turn; who is on its path is a leader
     enters = time_over(to_enter, speed, SOON_MPS2)
     leaves = time_over(to_leave, speed, LATE_MPS2)
-    arrives = time_to(times, begin_m - half - progress.station_m)
-    gone = time_to(times, end_m + half - progress.station_m)
+    arrives = time_to(times, crossings.begin_m[meet] - half - progress.station_m)
+    gone = time_to(times, crossings.end_m[meet] + half - progress.station_m)
     return leaves + numbers.clear_before_s > arrives and gone + numbers.clear_after_s > enters
 
 
 @kernel
 def crossing_acceleration(
-    sight: Sight,
-    path: DrivePath,
+    crossings: Crossings,
     progress: Progress,
-    actors: Actors,
-    ways: Ways,
-    ego: int,
+    visible: Visible,
     ahead: JunctionAhead,
     times: Float64,
     numbers: ExpertNumbers,
 ) -> float:
-    """What those who hold a grant for a crossing way allow.
+    """What those who cross the car's way through a junction allow.
 
     Args:
-        sight: From `look`.
-        path: The route's path.
+        crossings: Of the route's path.
         progress: Where the car is on it.
-        actors: Everybody.
-        ways: The town's lanes.
-        ego: The car.
+        visible: What is in sight.
         ahead: The junction.
         times: From `forecast`.
         numbers: From `ExpertConfig`.
@@ -146,23 +200,55 @@ def crossing_acceleration(
         Acceleration [m/s2].
     """
     best = NO_LIMIT_MPS2
-    half = actors.half_length[ego]
-    for leg in range(ahead.first_leg, ahead.end_leg):
-        lane, offset_m = path.leg_lane[leg], path.leg_offset_m[leg]
-        for k in range(ways.conflict_start[lane], ways.conflict_start[lane + 1]):
-            begin_m, end_m = ways.conflict_begin_m[k] + offset_m, ways.conflict_end_m[k] + offset_m
-            behind = end_m < progress.station_m - half
-            if behind or progress.station_m + half > begin_m + ZONE_MARGIN_M:
-                continue  # left behind, or already in it: then the others wait
-            if _share_start(ways, lane, ways.conflict_lane[k]):
-                continue  # they part from the car's own lane: leaders or followers
-            for i in range(sight.holders[0]):
-                actor = sight.holder[i]
-                if _meets(actors, ways, actor, k, begin_m, end_m, progress, half, times, numbers):
-                    front_m, speed = progress.station_m + half, actors.speed[ego]
-                    wait = _wait_before(begin_m, ahead.begin_m, front_m, speed, numbers)
-                    best = min(best, wait)
+    half, speed = visible.half_length[CAR], visible.speed[CAR]
+    front_m = progress.station_m + half
+    if ahead.begin_m - front_m > LOOK_M:
+        return best
+    begin, end = crossings.meet_start[ahead.first_leg], crossings.meet_start[ahead.first_leg + 1]
+    comers, stations = np.empty(MOST_COMERS, np.int32), np.empty(MOST_COMERS)
+    stream, count = -1, 0
+    for meet in range(begin, end):
+        if crossings.stream[meet] != stream:
+            stream = crossings.stream[meet]
+            rank = crossings.own_rank[ahead.first_leg]
+            count = _find_comers(crossings, stream, visible, rank, comers, stations)
+        begin_m, end_m = crossings.begin_m[meet], crossings.end_m[meet]
+        if end_m < progress.station_m - half or front_m > begin_m + ZONE_MARGIN_M:
+            continue  # left behind, or already in it: then the others wait
+        for i in range(count):
+            if _meets(crossings, meet, visible, comers[i], stations[i], progress, times, numbers):
+                best = min(best, _wait_before(begin_m, ahead.begin_m, front_m, speed, numbers))
     return best
+
+
+@kernel
+def _find_comers(
+    crossings: Crossings,
+    stream: int,
+    visible: Visible,
+    own_rank: int,
+    comers: Int32,
+    stations: Float64,
+) -> int:
+    """Fills in who comes along a stream, and where he is on it; returns how many."""
+    first = crossings.first[stream]
+    last = first + crossings.points[stream] - 1
+    reach, count = crossings.points[stream] * POINT_M + COARSE, 0
+    for row in range(CAR + 1, visible.seen[0]):
+        if visible.kind[row] >= _WALKER or count == comers.size:
+            continue
+        x, y = visible.x[row], visible.y[row]
+        dx, dy = x - crossings.x[last], y - crossings.y[last]
+        if dx * dx + dy * dy > reach * reach:
+            continue
+        station = station_on(crossings, stream, x, y, visible.z[row], visible.yaw[row])
+        if station == NOWHERE_M:
+            continue
+        front_m = station + visible.half_length[row]
+        if will_come(crossings, stream, visible, row, front_m, own_rank):
+            comers[count], stations[count] = row, station
+            count += 1
+    return count
 
 
 @kernel

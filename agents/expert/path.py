@@ -61,16 +61,18 @@ class DrivePath(NamedTuple):
     line_m: Float64  # station of the stop line
     line_signal: Int32
     line_kind: Int8  # SignalKind
+    crosswalk_m: Float64  # (X,) stations of the middles of crosswalks over the path
     end_m: Float64  # (1,) station of the route's last point
 
 
-def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
+def build_path(plan: RoutePlan, town: Town, config: ExpertConfig, told: bool = False) -> DrivePath:
     """Makes the path of a route.
 
     Args:
         plan: The dense route; it may jump sideways and step back.
         town: The town that it was planned in.
         config: Speeds and accelerations.
+        told: Whether the driver knows where scenarios will begin.
     """
     lanes = town.lanes
     legs = join_legs(legs_of(plan), lanes)
@@ -81,7 +83,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
     extend(line, legs_beyond(legs[-1], lanes), lanes)
     points = resample(line.points())
     curvature = curvature_of(points.yaw)
-    speeds = target_speeds(plan, points, curvature, line.legs, lanes, config)
+    speeds = target_speeds(plan, points, curvature, line.legs, lanes, config, told)
     leg_lane = np.array([leg.lane for leg in line.legs], np.int32)
     limits = [_room_end(jump, line.legs, lanes) for jump in line.jumps]
     stations, signal = _stop_lines(line.legs, town)
@@ -104,6 +106,7 @@ def build_path(plan: RoutePlan, town: Town, config: ExpertConfig) -> DrivePath:
         line_m=stations,
         line_signal=signal,
         line_kind=town.signals.kind[signal],
+        crosswalk_m=_crosswalks(line.legs, town),
         end_m=np.array([end_m]),
     )
     for array in path:
@@ -141,6 +144,14 @@ def _stop_lines(legs: list[LaidLeg], town: Town) -> tuple[Float64, Int32]:
     stations = np.array([station for station, _ in found], np.float64)
     lines = np.array([line for _, line in found], np.int32)
     return stations, town.signals.stop_signal[lines].astype(np.int32)
+
+
+def _crosswalks(legs: list[LaidLeg], town: Town) -> Float64:
+    """Stations of the middles of crosswalks over the legs."""
+    walks = town.crosswalks
+    middle = 0.5 * (walks.crossed_begin_m + walks.crossed_end_m)
+    found = [middle[walks.crossed_lane == leg.lane] + leg.offset_m for leg in legs]
+    return np.sort(np.concatenate(found))
 
 
 def _line_behind_start(first: LaidLeg, lanes: Lanes) -> list[tuple[float, int]]:

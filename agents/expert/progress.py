@@ -20,6 +20,8 @@ class Progress(NamedTuple):
     line: int  # next stop line
     stood_s: float  # for which it has stood at that line
     waiting_s: float  # for which it has waited for a gap to change lanes
+    still_s: float  # for which it has stood, kept until it really drives again
+    yellow_s: float  # for which it has seen the next light yellow
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""What the expert sees of others, and what looking round comes to: numbers, and who may cross."""
+"""What the expert sees of others from its path, and what looking round comes to."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.expert.speed import NO_LIMIT_MPS2
-from di_envs.numerics.arrays import Float64, Int32
+from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 
 FAR_M = 1e6
 
 
 class Sight(NamedTuple):
-    """What `look` finds: numbers by their place in `number`, and those who cross."""
+    """What `look` finds: numbers by their place in `number`."""
 
     number: Float64  # (7,) see the constants below
-    holder: Int32  # (32,) vehicles with a grant for a junction near
-    holders: Int32  # (1,) how many
 
 
 class Seen(NamedTuple):
     """Somebody seen from the path, at the place of the path that is beside him."""
 
-    actor: int
+    row: int  # of `Visible`
     station_m: float  # of his middle
     offset_m: float  # of his middle, positive to the right of the path
     turn_rad: float  # from the path's direction to his
@@ -42,4 +40,4 @@ def blank_sight() -> Sight:
     number[FRONT_OK] = 1.0
     number[REAR_OK] = 1.0
     number[ROOM_M] = FAR_M
-    return Sight(number, np.zeros(32, np.int32), np.zeros(1, np.int32))
+    return Sight(number)

@@ -6,19 +6,18 @@ actor 0, drives on it by the real decision kernel and the real longitudinal mode
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from agents.expert.base_line import STEP_M
 from agents.expert.config import ExpertConfig
+from agents.expert.crossings import Crossings
 from agents.expert.decision import decide, start_progress
 from agents.expert.path import DrivePath
 from agents.expert.progress import Progress
-from agents.expert.surroundings import Actors, Lights, Ways
+from agents.expert.visible import Visible, empty_visible
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import EgoModel, longitudinal_acceleration
-from di_envs.world.state import PATH_LANES, ActorKind
+from di_envs.world.state import ActorKind
 
 LENGTH_M = 400.0
 LIMIT_MPS = 14.0
@@ -33,6 +32,7 @@ def make_path(
     kind: SignalKind = SignalKind.LIGHT,
     junction: tuple[float, float] | None = None,
     change: tuple[float, float, float, float] | None = None,
+    crosswalks: tuple[float, ...] = (),
     limit_mps: float = LIMIT_MPS,
 ) -> DrivePath:
     """A straight path.
@@ -43,6 +43,7 @@ def make_path(
         junction: Stations between which a junction lies (lane 1; lanes 0 and 2 before and behind).
         change: A lane change's jump, latest begin, limit and shift [m]; before the jump the path
             runs on the old lane, at y = shift.
+        crosswalks: Stations of their middles.
     """
     count = int(LENGTH_M / STEP_M)
     station = np.arange(count) * STEP_M
@@ -69,69 +70,66 @@ def make_path(
         line_m=np.array(lines, np.float64),
         line_signal=np.zeros(len(lines), np.int32),
         line_kind=np.full(len(lines), kind, np.int8),
+        crosswalk_m=np.array(crosswalks, np.float64),
         end_m=np.array([LENGTH_M]),
     )
 
 
-def make_ways(crossing: tuple[float, float] | None = None) -> Ways:
-    """Lanes 0, 1, 2 of the path and lane 3, which crosses lane 1 of the junction.
+def make_crossings(crossing: tuple[float, float] | None = None) -> Crossings:
+    """Lanes 0, 1, 2 of the path and one stream, which crosses lane 1 of the junction.
+
+    It comes from the left along x = 110, from 45 m before the junction, which for it begins at
+    y = -7: so its station is y + 7.
 
     Args:
-        crossing: Stations on lane 1 between which lane 3 meets it, at its own stations 5 to 9 m.
+        crossing: Stations on lane 1 between which the stream meets it, at its own 5 to 9 m.
     """
     meets = [] if crossing is None else [crossing]
-    return Ways(
-        junction=np.array([-1, 0, -1, 0], np.int32),
-        length_m=np.array([100.0, 20.0, 280.0, 20.0]),
-        predecessor_start=np.zeros(5, np.int32),
-        predecessor=np.zeros(0, np.int32),
-        conflict_start=np.array([0, 0, len(meets), len(meets), len(meets)], np.int32),
-        conflict_lane=np.full(len(meets), 3, np.int32),
-        conflict_begin_m=np.array([m[0] for m in meets], np.float64),
-        conflict_end_m=np.array([m[1] for m in meets], np.float64),
-        conflict_other_begin_m=np.full(len(meets), 5.0),
-        conflict_other_end_m=np.full(len(meets), 9.0),
+    begins = np.arange(66.0) - 45.0
+    return Crossings(
+        own_rank=np.zeros(3, np.int8),
+        meet_start=np.array([0, 0, len(meets), len(meets)], np.int32),
+        stream=np.zeros(len(meets), np.int32),
+        begin_m=np.array([100.0 + m[0] for m in meets], np.float64),
+        end_m=np.array([100.0 + m[1] for m in meets], np.float64),
+        other_begin_m=np.full(len(meets), 5.0),
+        other_end_m=np.full(len(meets), 9.0),
+        first=np.zeros(1, np.int32),
+        points=np.array([begins.size], np.int32),
+        back_m=np.array([45.0]),
+        turn=np.zeros(1, np.int8),
+        rank=np.zeros(1, np.int8),
+        light=np.array([-1], np.int32),
+        sign=np.zeros(1, np.int8),
+        x=np.full(begins.size, 110.0),
+        y=begins - 7.0,
+        z=np.zeros(begins.size),
+        yaw=np.full(begins.size, np.pi / 2.0),
     )
 
 
-def make_actors(others: int = 0) -> Actors:
-    """The ego at the path's start, and cars that are far away until they are put somewhere."""
-    count = 1 + others
-    return Actors(
-        kind=np.full(count, ActorKind.CAR, np.int8),
-        x=np.array([0.0] + [-1e4] * others),
-        y=np.zeros(count),
-        z=np.zeros(count),
-        yaw=np.zeros(count),
-        speed=np.zeros(count),
-        half_length=np.array([HALF_M] + [2.4] * others),
-        half_width=np.array([MODEL.half_width_m] + [1.0] * others),
-        lane=np.full(count, -1, np.int32),
-        lane_m=np.zeros(count),
-        lateral_m=np.zeros(count),
-        path=np.full((count, PATH_LANES), -1, np.int32),
-        previous_lane=np.full(count, -1, np.int32),
-        changing_from=np.full(count, -1, np.int32),
-        grant=np.full(count, -1, np.int32),
-        walk_edge=np.full(count, -1, np.int32),
-    )
+def make_actors(others: int = 0) -> Visible:
+    """The ego at the path's start, and cars that are far away until they are put somewhere.
+
+    There is one light, and it is green.
+    """
+    actors = empty_visible(1 + others, 1)
+    for column in actors:
+        column[...] = 0
+    actors.seen[0] = 1 + others
+    actors.kind[:] = ActorKind.CAR
+    actors.x[1:] = -1e4
+    actors.half_length[:], actors.half_width[:], actors.height[:] = 2.4, 1.0, 1.5
+    actors.half_length[0], actors.half_width[0] = HALF_M, MODEL.half_width_m
+    actors.light[0] = LightState.GREEN
+    return actors
 
 
-def make_lights(state: LightState = LightState.GREEN, ticks: int = 0) -> Lights:
-    """One light, its turn begun `ticks` ago."""
-    return Lights(np.array([state], np.int8), np.zeros(1, np.int32), np.array([ticks], np.int32))
-
-
-def read_only(array: np.ndarray) -> np.ndarray:
-    """The same array as the world hands it out, so that it is the same machine code that runs."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
-
-
-def frozen(arrays: Any) -> Any:
-    """The same named tuple of arrays that cannot be written."""
-    return type(arrays)(*map(read_only, arrays))
+def frozen(path: DrivePath) -> DrivePath:
+    """The path as `build_path` makes it, read-only, so that it is the same machine code."""
+    for array in path:
+        array.flags.writeable = False
+    return path
 
 
 class Drive:
@@ -140,15 +138,13 @@ class Drive:
     def __init__(
         self,
         path: DrivePath,
-        actors: Actors,
+        actors: Visible,
         *,
-        ways: Ways | None = None,
-        lights: Lights | None = None,
+        crossings: Crossings | None = None,
         config: ExpertConfig = CONFIG,
     ) -> None:
-        self.path, self.actors = path, actors
-        self.ways = ways or make_ways()
-        self.lights = lights or make_lights()
+        self.path, self.actors = frozen(path), actors
+        self.crossings = crossings or make_crossings()
         self.numbers, self.model = config.numbers(), MODEL.parameters()
         self.progress: Progress = start_progress()
         self.control = (0.0, 0.0, 0.0)
@@ -173,12 +169,10 @@ class Drive:
     def step(self, dt_s: float = 0.1) -> None:
         """Decides and moves everybody straight on; the ego keeps to its path by itself."""
         throttle, steer, brake, self.progress = decide(
-            frozen(self.path),
+            self.path,
             self.progress,
-            frozen(self.actors),
-            frozen(self.ways),
-            frozen(self.lights),
-            0,
+            self.crossings,
+            self.actors,
             self.numbers,
             self.model,
         )
@@ -191,7 +185,6 @@ class Drive:
         speed, yaw = self.actors.speed[others], self.actors.yaw[others]
         self.actors.x[others] += speed * np.cos(yaw) * dt_s
         self.actors.y[others] += speed * np.sin(yaw) * dt_s
-        self.actors.lane_m[others] += speed * dt_s
         self.actors.x[0] += moved
 
     def run(self, seconds: float) -> None:

@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.expert.actors import PULL_OUT_M
+from agents.expert.decision import start_progress
 from agents.expert.path import CHANGE_ROOM_M
-from agents.expert.progress import Progress, shift_at
+from agents.expert.progress import shift_at
 from agents.expert.speed import NO_LIMIT_MPS2, follow, forecast, stop_within, time_to
+from agents.expert.visible import Visible
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.dynamics import longitudinal_acceleration, pedals
 from di_envs.world.state import ActorKind
@@ -24,9 +26,8 @@ from tests.agents.expert.straight_road import (
     MODEL,
     Drive,
     make_actors,
-    make_lights,
+    make_crossings,
     make_path,
-    make_ways,
 )
 
 NUMBERS = CONFIG.numbers()
@@ -72,10 +73,12 @@ def test_a_forecast_from_rest_obeys_the_square_root_of_twice_distance_over_accel
 
 def test_a_lane_change_leads_from_one_lane_to_the_other_without_a_jump():
     path = make_path(change=(50.0, 80.0, 150.0, -3.5))
-    waiting = Progress(40.0, 0, 0.0, 1.0, 0, False, 0.0)
+    waiting = start_progress()._replace(station_m=40.0)
     assert shift_at(path, waiting, 49.9)[0] == 0.0  # the base line is still on the old lane
     assert shift_at(path, waiting, 140.0)[0] == -3.5
-    under_way = Progress(60.0, 1, 60.0, 30.0, 0, False, 0.0)
+    under_way = start_progress()._replace(
+        station_m=60.0, changes=1, change_begin_m=60.0, change_length_m=30.0
+    )
     assert shift_at(path, under_way, 60.0)[0] == -3.5
     assert shift_at(path, under_way, 75.0)[0] == pytest.approx(-1.75)
     assert shift_at(path, under_way, 90.0) == (0.0, 0.0, 0.0)
@@ -131,39 +134,43 @@ def test_it_never_touches_a_leader_that_brakes_as_hard_as_it_can():
 
 
 def test_a_light_turned_red_stops_the_expert_before_the_line():
-    lights = make_lights(LightState.RED)
-    drive = Drive(make_path(line_m=150.0), make_actors(), lights=lights)
+    actors = make_actors()
+    actors.light[0] = LightState.RED
+    drive = Drive(make_path(line_m=150.0), actors)
     drive.run(40.0)
     assert drive.speed < 0.01
     assert 148.5 < drive.front < 150.0
-    lights.light[0], lights.phase_ticks[0] = LightState.GREEN, 0
+    actors.light[0] = LightState.GREEN
     drive.run(1.0)
     assert drive.speed > 2.0  # it starts at once
 
 
-@pytest.mark.parametrize(("seconds_left", "goes"), [(6.0, True), (2.0, False)])
-def test_it_enters_only_while_its_tail_will_be_over_the_line_before_red(
-    seconds_left: float, goes: bool
+@pytest.mark.parametrize("limit_mps", [5.0, 9.0, 14.0, 25.0])
+@pytest.mark.parametrize("yellow_at_m", [60.0, 40.0, 30.0, 24.0, 20.0, 16.0, 12.0, 8.0, 4.0, 1.0])
+def test_wherever_green_turns_yellow_its_tail_is_over_the_line_before_red_or_it_stops(
+    limit_mps: float, yellow_at_m: float
 ):
-    """At 12 m/s, 30 m before the line, the tail needs (30 + 4.9 + 1.3) / 12 = 3 s."""
-    lights = make_lights(LightState.GREEN, ticks=round((13.0 - seconds_left) / 0.05))
-    drive = Drive(make_path(line_m=150.0, limit_mps=12.0), make_actors(), lights=lights)
-    drive.place(150.0 - 30.0 - HALF_M, 12.0)
-    for _ in range(round(seconds_left / 0.1)):
+    """Nobody sees when green ends: yellow for two seconds, the shortest there is, then red."""
+    actors = make_actors()
+    drive = Drive(make_path(line_m=150.0, limit_mps=limit_mps), actors)
+    drive.place(20.0, limit_mps)
+    while 150.0 - drive.front > yellow_at_m:
         drive.step()
-        lights.phase_ticks[0] += 2
-    lights.light[0] = LightState.RED
-    if goes:
-        assert drive.x - HALF_M > 150.0
+    actors.light[0] = LightState.YELLOW
+    drive.run(2.0)
+    actors.light[0] = LightState.RED
+    if drive.front > 150.0:
+        assert drive.x - HALF_M - 1.0 > 150.0
     else:
-        drive.run(5.0)
+        drive.run(8.0)
         assert drive.front < 150.0
 
 
 def test_whoever_ignores_lights_runs_them():
     config = dataclasses.replace(CONFIG, ignore_lights=True)
-    lights = make_lights(LightState.RED)
-    drive = Drive(make_path(line_m=100.0), make_actors(), lights=lights, config=config)
+    actors = make_actors()
+    actors.light[0] = LightState.RED
+    drive = Drive(make_path(line_m=100.0), actors, config=config)
     drive.run(15.0)
     assert drive.x > 120.0
 
@@ -206,22 +213,50 @@ def test_it_goes_on_beside_a_walker_who_stands_next_to_it():
     assert drive.x > 70.0
 
 
-def test_it_lets_a_car_with_a_grant_pass_and_then_crosses():
+def at_the_crossing(station_m: float, speed: float) -> tuple[Drive, Visible]:
+    """The car before a junction, and another that comes along the way that crosses its own."""
     actors = make_actors(1)
-    actors.grant[1], actors.lane[1], actors.lane_m[1] = 3, 3, -6.0
-    actors.x[1], actors.y[1] = 110.0, -13.0
-    actors.yaw[1], actors.speed[1] = math.pi / 2.0, 3.0
-    drive = Drive(make_path(junction=(100.0, 120.0)), actors, ways=make_ways((8.0, 12.0)))
-    drive.place(85.0, 8.0)
-    crossed = False
+    actors.x[1], actors.y[1] = 110.0, station_m - 7.0
+    actors.yaw[1], actors.speed[1] = math.pi / 2.0, speed
+    path = make_path(junction=(100.0, 120.0))
+    drive = Drive(path, actors, crossings=make_crossings((8.0, 12.0)))
+    drive.place(80.0, 8.0)
+    return drive, actors
+
+
+def test_it_lets_a_car_pass_that_comes_and_then_crosses():
+    drive, actors = at_the_crossing(-12.0, 5.0)
     for _ in range(150):
         drive.step()
-        if actors.lane_m[1] - 2.4 < 9.0:  # it has not left the crossing place
+        if actors.y[1] + 7.0 - 2.4 < 9.0:  # it has not left the crossing place
             assert drive.front < 100.0 + 8.0
-        else:
-            actors.grant[1] = -1
-            crossed = True
-    assert crossed
+    assert drive.x > 120.0
+
+
+def test_it_goes_before_one_who_stands_at_his_line_or_brakes_for_it():
+    for station_m, speed, braking in ((-3.5, 0.0, 0), (-30.0, 8.0, 1)):
+        drive, actors = at_the_crossing(station_m, speed)
+        actors.brake_light[1] = braking
+        for _ in range(60):
+            drive.step()
+            actors.speed[1] = max(actors.speed[1] - 0.15, 0.0)  # 1.5 m/s2: he stops in 21 m
+        assert drive.x > 115.0
+
+
+def test_it_waits_for_one_who_comes_too_fast_to_stop_at_his_line_though_he_brakes():
+    drive, actors = at_the_crossing(-16.0, 11.0)
+    actors.brake_light[1] = 1  # 121 / (2 x 14.1): he would need 4.3 m/s2
+    drive.place(92.0, 6.0)
+    drive.step()
+    assert drive.control[2] > 0.0
+
+
+def test_it_takes_its_turn_when_somebody_stands_inside_the_junction_and_waits_too():
+    drive, _ = at_the_crossing(3.0, 0.0)
+    drive.place(99.3 - HALF_M, 0.0)
+    drive.run(1.5)
+    assert drive.front < 100.0
+    drive.run(9.0)
     assert drive.x > 120.0
 
 
@@ -291,27 +326,26 @@ def test_no_stop_is_no_limit():
     assert CONFIG.acceleration_mps2 < NO_LIMIT_MPS2
 
 
-def test_it_does_not_follow_a_crawling_queue_over_the_line_just_before_red():
+def test_it_does_not_follow_a_crawling_queue_over_the_line():
     actors = make_actors(1)
     actors.x[1], actors.speed[1] = 152.0, 2.0  # its rear has just crossed the line
-    lights = make_lights(LightState.GREEN, ticks=round(7.0 / 0.05))  # six seconds to red
-    drive = Drive(make_path(line_m=150.0), actors, lights=lights)
+    drive = Drive(make_path(line_m=150.0), actors)
     drive.place(140.0, 4.0)
     for _ in range(60):
         actors.speed[1] = max(actors.speed[1] - 0.05, 0.0)
         drive.step()
-        lights.phase_ticks[0] += 2
     assert drive.front < 150.0
 
 
 def test_with_its_tail_on_the_line_at_red_a_crawling_car_waits_for_green():
-    lights = make_lights(LightState.RED)
-    drive = Drive(make_path(line_m=150.0), make_actors(), lights=lights)
+    actors = make_actors()
+    actors.light[0] = LightState.RED
+    drive = Drive(make_path(line_m=150.0), actors)
     drive.place(150.0, 1.0)
     drive.run(10.0)
     # the rule's tail begins at 0.8 half lengths behind the centre
     assert drive.x - 0.8 * HALF_M < 150.0
-    lights.light[0], lights.phase_ticks[0] = LightState.GREEN, 0
+    actors.light[0] = LightState.GREEN
     drive.run(5.0)
     assert drive.x > 160.0
 
