@@ -9,17 +9,15 @@ import pytest
 from di_envs.numerics.geometry import boxes_overlap
 from di_envs.town.lanes import Crosswalks, LaneKind, LightState, SignalKind
 from di_envs.town.loading import load_town
-from di_envs.world.contact import DOWN
 from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.struck import strike
 from di_envs.world.walkers.crossing import could_stop, ticks_to_green
 from di_envs.world.walkers.lane_clearance import clearances
+from di_envs.world.walkers.neighbours import make_neighbours
+from di_envs.world.walkers.on_edges import mark_busy_crosswalks, place_on_edge
 from di_envs.world.walkers.personal_space import CLEAR_M
-from di_envs.world.walkers.strolling import (
-    mark_busy_crosswalks,
-    move_walkers,
-    place_on_edge,
-    spawn_walkers,
-)
+from di_envs.world.walkers.spawn import spawn_walkers
+from di_envs.world.walkers.strolling import move_walkers
 from di_envs.world.walkers.walk_graph import build_walk_graph
 from di_envs.world.world import World, WorldConfig
 from tests.di_envs.world.small_world import (
@@ -60,6 +58,11 @@ WITH_LIGHT = replace(OPEN, signals=make_signals())
 KERB = 10.0 - 5.25 - 1.25  # station at which walkers from the south wait
 
 
+def walk_on(state, walk, first, end, signals=NO_SIGNALS):
+    """One tick of the walkers [first, end)."""
+    move_walkers(state, walk, signals, make_neighbours(state.kind.size), first, end)
+
+
 class Crossing:
     """One walker (actor 2) at the southern kerb, an ego (0, absent) and a vehicle (1, absent)."""
 
@@ -76,7 +79,7 @@ class Crossing:
     def tick(self, ticks=1):
         for _ in range(ticks):
             self.state.tick[()] += 1
-            move_walkers(self.state, self.walk, self.town.signals, 2, 3)
+            walk_on(self.state, self.walk, 2, 3, self.town.signals)
             mark_busy_crosswalks(self.state, self.walk, self.busy)
 
     def go(self, edge, station, direction=1, walker=2):
@@ -163,7 +166,7 @@ def test_a_town_without_sidewalks_has_no_walkers():
     state = make_state(walkers=3)
     spawn_walkers(state, walk, 1, 3)
     assert list(state.kind[1:]) == [ActorKind.ABSENT] * 3
-    move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+    walk_on(state, walk, 1, state.kind.size)
 
 
 # strolling
@@ -227,7 +230,7 @@ def test_a_fast_walker_does_not_walk_into_a_slow_one():
         state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
     for _ in range(1000):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+        walk_on(state, walk, 1, state.kind.size)
         assert state.walk_m[1] - state.walk_m[2] > CLEAR_M
     assert state.walk_m[1] == pytest.approx(50.0)
     assert state.walk_m[2] > 47.0
@@ -248,7 +251,7 @@ def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_one_turns_back():
     gaps = []
     for _ in range(300):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+        walk_on(state, walk, 1, state.kind.size)
         gaps.append(abs(state.x[1] - state.x[2]))
     assert CLEAR_M <= min(gaps) < CLEAR_M + 0.1
     assert state.walk_direction[1] == state.walk_direction[2]
@@ -399,7 +402,7 @@ def test_who_waits_for_forty_seconds_turns_back():
 def test_who_was_knocked_down_lies_for_ten_seconds():
     crossing = Crossing()
     crossing.tick(40)
-    crossing.state.walk_waiting[2] = DOWN
+    strike(crossing.state, 2)
     crossing.tick(200)
     assert crossing.state.kind[2] == ActorKind.WALKER
     assert crossing.busy[0]
@@ -457,7 +460,7 @@ def test_walkers_stroll_on_the_real_town05_which_has_no_crosswalks(shared):
     spawn_walkers(state, walk, 1, 60)
     for _ in range(1200):
         state.tick[()] += 1
-        move_walkers(state, walk, town.signals, 1, 61)
+        walk_on(state, walk, 1, 61, town.signals)
     places = np.column_stack((state.x, state.y, state.z))[1:]
     assert clearances(town.lanes, places).min() >= 0.25 + 0.4 - 1e-6
     assert (state.kind[1:] == ActorKind.WALKER).all()
