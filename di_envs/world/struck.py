@@ -12,7 +12,7 @@ from di_envs.world.state import TICK_S, ActorKind, State
 
 DOWN = 2  # walk_waiting of who was knocked down
 SLIDE_MPS2 = 6.0  # that a body on the ground loses
-GRIP_MPS2 = 7.0  # that locked wheels take, on dry asphalt
+GRIP_MPS2 = 8.0  # that locked wheels take, more than an ego can push with
 LIE_TICKS = round(10.0 / TICK_S)  # until who lies is taken away
 SHOCK_TICKS = round(5.0 / TICK_S)  # that a driver stands who was hit
 

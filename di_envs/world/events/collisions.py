@@ -71,11 +71,12 @@ def count_contact(state: State, ego: int, other: int, out: Float64, n: int) -> i
         The number of rows of `out` in use.
     """
     if is_impact(state, ego, other):
+        again = state.last_collision_actor[ego] == other  # within 5 s: part of that collision
         if state.hit[ego, other] == 0 and state.finished[ego] == 0:
             x, y, z = state.x[ego], state.y[ego], state.z[ego]
             kind = FIRST_HIT_WALKER + _class_of(state, other)
             n = record(out, n, kind, ego, int(state.tick[()]), x, y, z, other, 0.0)
-        state.hit[ego, other] = TOUCHED
+        state.hit[ego, other] = COUNTED if again else TOUCHED
     state.contact_tick[ego, other] = state.tick[()]
     if state.hit[ego, other] == TOUCHED and state.finished[ego] == 0:
         before = n
@@ -95,7 +96,7 @@ def _class_of(state: State, other: int) -> int:
 
 @kernel
 def _count_collision(state: State, ego: int, other: int, out: Float64, n: int) -> int:
-    """Records a contact, unless it is with the last actor hit or near the place of another.
+    """Records a contact, unless it is near the place of another.
 
     The ego's own speed plays no part: being hit while standing counts in 1.0. As the place is the
     ego's, at most one collision counts in a tick.
@@ -103,8 +104,6 @@ def _count_collision(state: State, ego: int, other: int, out: Float64, n: int) -
     Returns:
         The number of rows of `out` in use.
     """
-    if state.last_collision_actor[ego] == other:
-        return n
     x, y, z = state.x[ego], state.y[ego], state.z[ego]
     for k in range(COLLISION_MEMORY):  # a free slot is NaN, and near nothing
         dx, dy = state.collision_places[ego, k, 0] - x, state.collision_places[ego, k, 1] - y

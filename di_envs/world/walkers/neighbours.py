@@ -12,8 +12,9 @@ from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
 from di_envs.world.state import ActorKind, State
 
-CELL_M = 2.0  # neighbours are looked for up to so far, less what somebody moves in a tick
-SIDE = 32  # cells; places 64 m apart share one, and are told apart by their distance
+CELL_M = 3.0
+WITHIN_M = 1.4  # neighbours are looked for, less what they move in a tick: at most four cells
+SIDE = 32  # cells; places 96 m apart share one, and are told apart by their distance
 WALKER = int(ActorKind.WALKER)
 
 
@@ -33,11 +34,20 @@ def make_neighbours(actors: int) -> Neighbours:
 
 
 @kernel
-def cell_at(x: float, y: float, right: int, down: int) -> int:
-    """The cell so many columns and rows beside that of a place (x, y) [m], world frame."""
-    column = (math.floor(x / CELL_M) + right) % SIDE
-    row = (math.floor(y / CELL_M) + down) % SIDE
-    return row * SIDE + column
+def cell_of(column: int, row: int) -> int:
+    """The cell of a column and a row of the plane."""
+    return (row % SIDE) * SIDE + column % SIDE
+
+
+@kernel
+def cells_around(x: float, y: float) -> tuple[int, int, int, int]:
+    """Columns [begin, end) and rows [begin, end) within reach of a place [m], world frame."""
+    return (
+        math.floor((x - WITHIN_M) / CELL_M),
+        math.floor((x + WITHIN_M) / CELL_M) + 1,
+        math.floor((y - WITHIN_M) / CELL_M),
+        math.floor((y + WITHIN_M) / CELL_M) + 1,
+    )
 
 
 @kernel
@@ -47,6 +57,7 @@ def fill_neighbours(near: Neighbours, state: State, first: int, end: int) -> Non
     for back in range(end - first):
         walker = end - 1 - back
         if state.kind[walker] == WALKER:
-            cell = cell_at(state.x[walker], state.y[walker], 0, 0)
+            x, y = state.x[walker], state.y[walker]
+            cell = cell_of(math.floor(x / CELL_M), math.floor(y / CELL_M))
             near.next[walker] = near.first[cell]
             near.first[cell] = walker

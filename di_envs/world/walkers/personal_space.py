@@ -12,7 +12,7 @@ from di_envs.numerics.kernels import kernel
 from di_envs.world.bodies import SAME_LEVEL_M
 from di_envs.world.state import State
 from di_envs.world.walkers.crossing import is_blocked
-from di_envs.world.walkers.neighbours import Neighbours, cell_at
+from di_envs.world.walkers.neighbours import Neighbours, cell_of, cells_around
 from di_envs.world.walkers.on_edges import Place
 from di_envs.world.walkers.walk_graph import WalkGraph
 
@@ -26,9 +26,10 @@ def step_is_free(state: State, near: Neighbours, walker: int, x: float, y: float
     """Whether a walker may step to (x, y): it comes near nobody, or leads away from who is near."""
     here_x, here_y = state.x[walker], state.y[walker]
     xs, ys = state.x, state.y
-    for down in range(-1, 2):
-        for right in range(-1, 2):
-            other = near.first[cell_at(x, y, right, down)]
+    left, right, top, bottom = cells_around(x, y)
+    for row in range(top, bottom):
+        for column in range(left, right):
+            other = near.first[cell_of(column, row)]
             while other >= 0:
                 dx, dy = xs[other] - x, ys[other] - y
                 after = dx * dx + dy * dy

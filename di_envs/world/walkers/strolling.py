@@ -15,7 +15,7 @@ from di_envs.town.lanes import Signals
 from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.struck import DOWN, lie, take_away
 from di_envs.world.walkers.crossing import is_blocked, may_cross
-from di_envs.world.walkers.neighbours import Neighbours, cell_at, fill_neighbours
+from di_envs.world.walkers.neighbours import Neighbours, cell_of, cells_around, fill_neighbours
 from di_envs.world.walkers.on_edges import guide_of, is_over, place_on_edge, road_part, travelled
 from di_envs.world.walkers.personal_space import step_aside, step_is_free
 from di_envs.world.walkers.walk_graph import WalkGraph
@@ -45,9 +45,10 @@ def _behind_others(state: State, near: Neighbours, walker: int, pace: float) -> 
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     at, edges = state.walk_m[walker], state.walk_edge
     queues = False
-    for down in range(-1, 2):
-        for right in range(-1, 2):
-            other = near.first[cell_at(state.x[walker], state.y[walker], right, down)]
+    left, right, top, bottom = cells_around(state.x[walker], state.y[walker])
+    for row in range(top, bottom):
+        for column in range(left, right):
+            other = near.first[cell_of(column, row)]
             while other >= 0:
                 same = edges[other] == edge and state.walk_direction[other] == direction
                 if same and other != walker:
