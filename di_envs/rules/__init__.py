@@ -13,12 +13,13 @@ from types import MappingProxyType
 from di_envs.rules.carla_1_0 import CARLA_1_0
 from di_envs.rules.carla_2_0 import CARLA_2_0
 from di_envs.rules.carla_2_1 import CARLA_2_1
+from di_envs.rules.di_1_0 import DI_1_0
 from di_envs.rules.rule_set import Rules
 
-__all__ = ["CARLA_1_0", "CARLA_2_0", "CARLA_2_1", "RULES", "Rules", "rules_named"]
+__all__ = ["CARLA_1_0", "CARLA_2_0", "CARLA_2_1", "DI_1_0", "RULES", "Rules", "rules_named"]
 
 RULES: Mapping[str, Rules] = MappingProxyType(
-    {rules.name: rules for rules in (CARLA_1_0, CARLA_2_0, CARLA_2_1)}
+    {rules.name: rules for rules in (CARLA_1_0, CARLA_2_0, CARLA_2_1, DI_1_0)}
 )
 
 

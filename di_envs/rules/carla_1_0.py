@@ -10,7 +10,7 @@ anew). `docs/rules.md` says what CARLA's own code does besides.
 from __future__ import annotations
 
 from di_envs.rules.penalties import Form, Penalties
-from di_envs.rules.rule_set import Layout, Rules
+from di_envs.rules.rule_set import NOT_CARLAS, Layout, Rules
 from di_envs.world.kinds import EventKind
 
 CARLA_1_0 = Rules(
@@ -26,5 +26,5 @@ CARLA_1_0 = Rules(
         },
     ),
     layout=Layout.V1,
-    ignored=frozenset({EventKind.SCENARIO, EventKind.MIN_SPEED}),
+    ignored=NOT_CARLAS | {EventKind.MIN_SPEED},
 )

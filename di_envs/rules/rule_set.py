@@ -27,6 +27,18 @@ ENDINGS: Mapping[EventKind, str] = MappingProxyType(
 )
 
 
+# what is put in an ego's way, and what `di-1.0` sees besides: nothing that CARLA's rules count
+NOT_CARLAS = frozenset(
+    {
+        EventKind.SCENARIO,
+        EventKind.FIRST_HIT_WALKER,
+        EventKind.FIRST_HIT_VEHICLE,
+        EventKind.FIRST_HIT_STATIC,
+        EventKind.RED_LIGHT_WIDE,
+    }
+)
+
+
 class Layout(StrEnum):
     """Whose `results.json` a run's is like."""
 
@@ -45,6 +57,7 @@ class Rules:
         layout: Of CARLA's result file, with its statuses.
         completion_decimals: To which the route completion [percent] is rounded; None for not.
         ignored: Kinds that cost nothing and end nothing. Others are refused.
+        since_world: The first world version that records all these rules count.
         endings: The route's status by the event that ended it; all rule sets call them alike.
     """
 
@@ -52,7 +65,8 @@ class Rules:
     penalties: Penalties
     layout: Layout
     completion_decimals: int | None = None
-    ignored: frozenset[EventKind] = frozenset({EventKind.SCENARIO})
+    ignored: frozenset[EventKind] = NOT_CARLAS
+    since_world: int = 1
     endings: ClassVar[Mapping[EventKind, str]] = ENDINGS
 
     def __post_init__(self) -> None:
@@ -96,12 +110,16 @@ class Rules:
         return status
 
 
-# CARLA's own order
+# CARLA's own order; no rule set counts both of a pair
 _LISTED = (
     EventKind.COLLISION_WALKER,
+    EventKind.FIRST_HIT_WALKER,
     EventKind.COLLISION_VEHICLE,
+    EventKind.FIRST_HIT_VEHICLE,
     EventKind.COLLISION_STATIC,
+    EventKind.FIRST_HIT_STATIC,
     EventKind.RED_LIGHT,
+    EventKind.RED_LIGHT_WIDE,
     EventKind.STOP_SIGN,
     EventKind.OUTSIDE_LANES,
     EventKind.ROUTE_DEVIATION,

@@ -24,7 +24,8 @@ from di_envs.world.traffic.occupancy import make_occupancy
 from di_envs.world.traffic.spawn import spawn_traffic
 from di_envs.world.traffic.speed_choice import make_leaders
 from di_envs.world.traffic.tables import TrafficTables, traffic_tables
-from di_envs.world.walkers.strolling import spawn_walkers
+from di_envs.world.walkers.neighbours import make_neighbours
+from di_envs.world.walkers.spawn import spawn_walkers
 from di_envs.world.walkers.walk_graph import WalkGraph, build_walk_graph
 
 # Fields of which 0 would mean something: a fresh record gets -1 there, for none
@@ -89,6 +90,7 @@ def make_scratch(town: Town, capacity: Capacity) -> Scratch:
         occupancy=make_occupancy(town.lanes.kind.size, actors, capacity.egos),
         requests=make_requests(actors),
         leaders=make_leaders(actors),
+        neighbours=make_neighbours(actors),
         busy=np.zeros(town.crosswalks.width_m.size, np.int8),
         acceleration=np.zeros(actors),
         cap=np.zeros(actors),

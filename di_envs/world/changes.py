@@ -14,9 +14,10 @@ from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import nearest_driving_lane_towards, pose_at, project_to_lane
 from di_envs.world.lights import show_lights
 from di_envs.world.state import ActorKind, State
+from di_envs.world.struck import take_away
 from di_envs.world.traffic.motion import choose_path, place_vehicle
 from di_envs.world.traffic.tables import TrafficTables
-from di_envs.world.walkers.strolling import place_on_edge
+from di_envs.world.walkers.on_edges import place_on_edge
 from di_envs.world.walkers.walk_graph import WalkGraph
 
 REACH_M = 3.0  # from a lane or way, within which an actor is set down on it
@@ -31,10 +32,7 @@ class ChangeError(ValueError):
 def remove_actor(state: State, actor: int) -> None:
     """Takes an actor away for the rest of the episode. What an ego has done still counts."""
     check_actor(state, actor)
-    state.kind[actor] = ActorKind.ABSENT
-    state.lane[actor] = state.grant[actor] = state.leaving[actor] = -1
-    state.previous_lane[actor] = state.changing_from[actor] = -1
-    state.speed[actor] = state.acceleration[actor] = state.yaw_rate[actor] = 0.0
+    take_away(state, actor)
     if actor < state.throttle.size:
         state.occupied[actor] = -1
 

@@ -2,8 +2,10 @@
 
 A contact is a perfectly inelastic impact of two point masses along the contact normal; each body
 then keeps the part of its velocity that lies along its heading, as neither slides sideways nor
-reverses. The ego is pushed out of a vehicle or prop; a walker is pushed out of the ego's way and
-lies down (`walk_waiting` is DOWN). Vehicles stay on their lanes and only change speed.
+reverses. Vehicles stay on their lanes and only change speed: who was hit stands on the brakes, and
+a vehicle that stands is not moved by a push that its locked wheels hold. The ego is pushed out of a
+vehicle or prop. Who is on foot or on two wheels falls (`walk_waiting` is DOWN), is thrown along the
+normal, slides and lies, and is then in nobody's way. What becomes of them later is in `struck.py`.
 """
 
 from __future__ import annotations
@@ -15,16 +17,16 @@ import numpy as np
 from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
 from di_envs.world.bodies import box_of, may_touch, overlap
-from di_envs.world.events.collisions import count_collision, forget_collisions
+from di_envs.world.events.collisions import count_contact, forget_collisions, is_impact
 from di_envs.world.events.rows import count_rows
-from di_envs.world.state import ActorKind, State
+from di_envs.world.state import TICK_S, ActorKind, State
+from di_envs.world.struck import DOWN, GRIP_MPS2, falls, strike
 
 SLOP_M = 1e-3  # left between bodies that were pushed apart
 PASSES = 3  # pushing an ego out of one body may push it into the next
-DOWN = 2  # walk_waiting of a walker who was knocked down
+HELD_MPS = GRIP_MPS2 * TICK_S  # that locked wheels take of a speed in a tick
 
-ABSENT, WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
-DEBRIS = int(ActorKind.DEBRIS)
+ABSENT, DEBRIS = int(ActorKind.ABSENT), int(ActorKind.DEBRIS)
 
 # 1 / mass [1/kg] by ActorKind; what is lifeless does not move
 INVERSE_MASS = np.array(
@@ -34,7 +36,13 @@ INVERSE_MASS = np.array(
 
 @kernel
 def speeds_after(
-    ego_speed: float, ego_weight: float, ego_along: float, speed: float, weight: float, along: float
+    ego_speed: float,
+    ego_weight: float,
+    ego_along: float,
+    speed: float,
+    weight: float,
+    along: float,
+    held: float,
 ) -> tuple[float, float]:
     """Speeds of an ego and another body after an inelastic impact; neither falls below zero.
 
@@ -42,6 +50,7 @@ def speeds_after(
         ego_speed, speed: Before it [m/s].
         ego_weight, weight: Inverse masses [1/kg], not both 0.
         ego_along, along: Cosines between each heading and the normal from the ego to the other.
+        held: Speed [m/s] that the other would have to gain before it moves at all, as it stands.
     """
     closing = ego_speed * ego_along - speed * along
     if closing <= 0.0:
@@ -49,8 +58,8 @@ def speeds_after(
     impulse = closing / (ego_weight + weight)
     ego_after = ego_speed - impulse * ego_weight * ego_along
     after = speed + impulse * weight * along
-    # what would be thrown back stands like a wall instead
-    if after < 0.0:
+    # what would be thrown back, or is held, stands like a wall instead
+    if after < 0.0 or (speed <= 0.0 and impulse * weight <= held):
         after, ego_after = 0.0, ego_speed * (1.0 - ego_along * ego_along)
     if ego_after < 0.0:
         ego_after, after = 0.0, speed * (1.0 - along * along)
@@ -69,6 +78,7 @@ def _exchange_speed(state: State, ego: int, other: int, nx: float, ny: float) ->
         state.speed[other],
         INVERSE_MASS[state.kind[other]],
         along,
+        HELD_MPS if other >= state.throttle.size else 0.0,
     )
 
 
@@ -82,14 +92,23 @@ def _part(state: State, ego: int, other: int, share: float, dx: float, dy: float
 
 
 @kernel
-def _knock_down(state: State, ego: int, walker: int) -> None:
-    """The walker takes its share of momentum once, then lies, pushed along without weight."""
-    if state.walk_waiting[walker] != DOWN:
-        ego_weight = INVERSE_MASS[state.kind[ego]]
-        state.speed[ego] *= INVERSE_MASS[WALKER] / (INVERSE_MASS[WALKER] + ego_weight)
-    state.speed[walker] = 0.0
-    state.walk_waiting[walker] = DOWN
-    state.still_ticks[walker] = 0
+def _throw(state: State, ego: int, other: int, nx: float, ny: float) -> None:
+    """Who stood in the ego's way takes on its speed along the unit normal (nx, ny), world frame."""
+    weight, ego_weight = INVERSE_MASS[state.kind[other]], INVERSE_MASS[state.kind[ego]]
+    along = math.cos(state.yaw[ego]) * nx + math.sin(state.yaw[ego]) * ny
+    impulse = max(state.speed[ego] * along, 0.0) / (ego_weight + weight)
+    state.speed[ego] = max(state.speed[ego] - impulse * ego_weight * along, 0.0)
+    state.speed[other] = impulse * weight
+    state.yaw[other] = math.atan2(ny, nx)
+
+
+@kernel
+def _collide(state: State, ego: int, other: int, nx: float, ny: float) -> None:
+    """Gives an ego and another body their speeds after a contact."""
+    if falls(state.kind[other]) and state.lane[other] < 0:
+        _throw(state, ego, other, nx, ny)
+    else:
+        _exchange_speed(state, ego, other, nx, ny)
 
 
 @kernel
@@ -128,20 +147,21 @@ def _resolve_once(state: State, out: Float64, n: int) -> tuple[bool, int]:
                 continue
             if state.kind[other] == ABSENT or state.kind[ego] == ABSENT:
                 continue
-            if state.kind[other] == DEBRIS:  # lies flat: wheels go over it
+            # wheels go over what lies flat, and round or over who lies there
+            if state.kind[other] == DEBRIS or state.walk_waiting[other] == DOWN:
                 continue
             depth, nx, ny = overlap(box_of(state, ego), box_of(state, other))
             if depth <= 0.0:
                 continue
             touched = True
+            _collide(state, ego, other, nx, ny)
             share = 0.5 if other < egos else 1.0
-            if state.kind[other] == WALKER:
-                _knock_down(state, ego, other)
+            if falls(state.kind[other]):
                 share = 0.0
-            else:
-                _exchange_speed(state, ego, other, nx, ny)
             _part(state, ego, other, share, (depth + SLOP_M) * nx, (depth + SLOP_M) * ny)
-            n = count_collision(state, ego, other, out, n)
+            if other >= egos and is_impact(state, ego, other):
+                strike(state, other)
+            n = count_contact(state, ego, other, out, n)
             if other < egos:
-                n = count_collision(state, other, ego, out, n)
+                n = count_contact(state, other, ego, out, n)
     return touched, n

@@ -24,6 +24,10 @@ EVENT_NAMES: Mapping[EventKind, str] = MappingProxyType(
         EventKind.COMPLETED: "completed",
         EventKind.SCENARIO: "scenario",
         EventKind.MIN_SPEED: "too slow",
+        EventKind.FIRST_HIT_WALKER: "walker hit (each once)",
+        EventKind.FIRST_HIT_VEHICLE: "vehicle hit (each once)",
+        EventKind.FIRST_HIT_STATIC: "object hit (each once)",
+        EventKind.RED_LIGHT_WIDE: "red light (whole line)",
     }
 )
 

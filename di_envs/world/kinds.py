@@ -24,7 +24,7 @@ class ActorKind(IntEnum):
 
 
 class EventKind(IntEnum):
-    """What Leaderboards 1.0 and 2.x count, what ends a route, and what was put in an ego's way."""
+    """What the rule sets count, what ends a route, and what was put in an ego's way."""
 
     COLLISION_WALKER = 1
     COLLISION_VEHICLE = 2
@@ -38,3 +38,8 @@ class EventKind(IntEnum):
     COMPLETED = 10
     SCENARIO = 11  # one began; value: its type, other: its number among the plan's scenarios
     MIN_SPEED = 12  # value: the ego's mean speed in percent of the traffic's; counts in 2.x only
+    # by di-1.0, beside what CARLA's rules see: each body once, and the stop line as wide as it is
+    FIRST_HIT_WALKER = 13
+    FIRST_HIT_VEHICLE = 14
+    FIRST_HIT_STATIC = 15
+    RED_LIGHT_WIDE = 16

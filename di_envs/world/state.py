@@ -61,7 +61,8 @@ class State(NamedTuple):
     leaving_m: NDArray[np.float64]  # how far the centre is beyond the end of that lane
     arrival_tick: NDArray[np.int64]  # when it came to the stop line it waits at, -1 for none
     stopped_at: NDArray[np.int32]  # stop line at which it has stopped for the sign, -1 for none
-    still_ticks: NDArray[np.int32]  # ticks for which it has stood still
+    still_ticks: NDArray[np.int32]  # ticks for which it has stood still, or a walker got nowhere
+    shock_ticks: NDArray[np.int32]  # ticks that one who was hit will still stand, 0 for none
     desired_factor: NDArray[np.float64]  # of the speed limit, per driver
     brake_light: NDArray[np.int8]
     indicator: NDArray[np.int8]  # -1 left, 0 off, 1 right
@@ -69,7 +70,8 @@ class State(NamedTuple):
     walk_edge: NDArray[np.int32]  # edge of the walking graph
     walk_m: NDArray[np.float64]  # station along it
     walk_direction: NDArray[np.int8]  # 1 along the edge, -1 against
-    walk_waiting: NDArray[np.int8]  # 1 while waiting at a kerb
+    walk_waiting: NDArray[np.int8]  # 1 while waiting at a kerb, 2 (DOWN) for who was knocked down
+    walk_side: NDArray[np.int8]  # to which one goes round others: 1 right, -1 left, 0 none yet
     # lights: (J,) junctions, (S,) signal heads
     phase_group: NDArray[np.int32]  # group whose turn it is
     phase_ticks: NDArray[np.int32]  # ticks since its green began
@@ -97,7 +99,10 @@ class State(NamedTuple):
     last_collision_actor: NDArray[np.int32]
     last_collision_tick: NDArray[np.int64]
     collision_places: NDArray[np.float64]  # (E, COLLISION_MEMORY, 2), NaN for none
+    contact_tick: NDArray[np.int64]  # (E, A) last tick at which the ego touched a body, 0 for none
+    hit: NDArray[np.int8]  # (E, A) 1: the ego has touched it, 2: and this contact was counted
     last_red_signal: NDArray[np.int32]
+    last_wide_signal: NDArray[np.int32]  # the same by the whole stop line
     stop_target: NDArray[np.int32]  # stop sign being watched, -1 for none
     stop_done: NDArray[np.int8]  # the ego stopped for it
     stop_affected: NDArray[np.int8]  # the ego was in its box
@@ -174,12 +179,12 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         **dict.fromkeys(("grant", "leaving"), (_I4, actors)),
         "leaving_m": (_F8, actors),
         "arrival_tick": (_I8, actors),
-        **dict.fromkeys(("stopped_at", "still_ticks"), (_I4, actors)),
+        **dict.fromkeys(("stopped_at", "still_ticks", "shock_ticks"), (_I4, actors)),
         "desired_factor": (_F8, actors),
         **dict.fromkeys(("brake_light", "indicator"), (_I1, actors)),
         "walk_edge": (_I4, actors),
         "walk_m": (_F8, actors),
-        **dict.fromkeys(("walk_direction", "walk_waiting"), (_I1, actors)),
+        **dict.fromkeys(("walk_direction", "walk_waiting", "walk_side"), (_I1, actors)),
         **dict.fromkeys(("phase_group", "phase_ticks"), (_I4, (capacity.junctions,))),
         **dict.fromkeys(("light", "forced_light"), (_I1, (capacity.signals,))),
         "held_by": (_I4, (capacity.junctions,)),
@@ -196,7 +201,9 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         "last_collision_actor": (_I4, egos),
         "last_collision_tick": (_I8, egos),
         "collision_places": (_F8, (*egos, COLLISION_MEMORY, 2)),
-        **dict.fromkeys(("last_red_signal", "stop_target"), (_I4, egos)),
+        "contact_tick": (_I8, (*egos, *actors)),
+        "hit": (_I1, (*egos, *actors)),
+        **dict.fromkeys(("last_red_signal", "last_wide_signal", "stop_target"), (_I4, egos)),
         **dict.fromkeys(("stop_done", "stop_affected", "outside_lane", "wrong_lane"), (_I1, egos)),
         "lane_before": (_I4, egos),
         "lane_before_yaw": (_F8, egos),

@@ -19,6 +19,7 @@ from di_envs.world.lights import advance_lights
 from di_envs.world.scenarios.staging import move_scenarios, occupy_crossings, watch_scenarios
 from di_envs.world.scenarios.tables import ScenarioTables
 from di_envs.world.state import ActorKind, Routes, State
+from di_envs.world.struck import GRIP_MPS2, pass_shocks
 from di_envs.world.traffic.approach import Requests, note_ego_arrival
 from di_envs.world.traffic.lane_change import change_lanes
 from di_envs.world.traffic.motion import move_vehicle, take_another_way
@@ -26,7 +27,9 @@ from di_envs.world.traffic.occupancy import Occupancy, fill_occupancy
 from di_envs.world.traffic.right_of_way import update_grants
 from di_envs.world.traffic.speed_choice import Leaders, choose_speed, find_leaders
 from di_envs.world.traffic.tables import TrafficTables
-from di_envs.world.walkers.strolling import mark_busy_crosswalks, move_walkers
+from di_envs.world.walkers.neighbours import Neighbours
+from di_envs.world.walkers.on_edges import mark_busy_crosswalks
+from di_envs.world.walkers.strolling import move_walkers
 from di_envs.world.walkers.walk_graph import WalkGraph
 
 _ABSENT = int(ActorKind.ABSENT)
@@ -53,6 +56,7 @@ class Scratch(NamedTuple):
     occupancy: Occupancy
     requests: Requests
     leaders: Leaders
+    neighbours: Neighbours
     busy: NDArray[np.int8]  # (X,) crosswalks that somebody walks on
     acceleration: NDArray[np.float64]  # (A,)
     cap: NDArray[np.float64]  # (A,)
@@ -89,7 +93,9 @@ def advance(
         state.tick[()] += 1
         advance_lights(state, scenery.signals)
         _move_traffic(state, scenery, scratch, egos, vehicle_end)
-        move_walkers(state, scenery.walk, scenery.signals, vehicle_end, walker_end)
+        move_walkers(
+            state, scenery.walk, scenery.signals, scratch.neighbours, vehicle_end, walker_end
+        )
         move_scenarios(state, scenery.scenarios, scenery.signals, vehicle_end, walker_end)
         for ego in range(egos):
             if state.kind[ego] != _ABSENT:
@@ -136,8 +142,11 @@ def _move_traffic(
             scratch.acceleration[actor], scratch.cap[actor] = choose_speed(
                 state, lanes, tables, leaders, requests, scratch.busy, egos, actor
             )
+            if state.shock_ticks[actor] > 0:  # who was hit stands on the brakes, or slides
+                scratch.acceleration[actor] = -GRIP_MPS2
     for actor in range(egos, vehicle_end):
         if state.kind[actor] != _ABSENT:
             move_vehicle(
                 state, lanes, tables, actor, scratch.acceleration[actor], scratch.cap[actor]
             )
+    pass_shocks(state, egos, vehicle_end)

@@ -15,7 +15,7 @@ from leaderboard.commands.scene_arguments import says
 SCORE_HELP = """Score a finished run by other rules, without driving, beside its own.
 
 Examples:
-  driveinsight score results/expert-town05_long --rules carla-2.1
+  driveinsight score results/expert-town05_long --rules di-1.0
   driveinsight score results/mine --rules carla-2.0 --output results/mine-2.0
 
 What was detected stays; docs/rules.md says what each rule set makes of it."""
@@ -29,7 +29,7 @@ class ScoreByRules:
     """The run's output folder, or results.json or driveinsight.json in it."""
 
     rules: Annotated[str, tyro.conf.arg(metavar="NAME")]
-    """carla-1.0, carla-2.0 or carla-2.1."""
+    """di-1.0, carla-1.0, carla-2.0 or carla-2.1."""
 
     output: Annotated[Path | None, says("DIR", "write nothing")] = None
     """Folder for the run as those rules score it."""

@@ -66,7 +66,8 @@ def met(event: EventRecord) -> str:
     """Whom or what an event was with, with its number."""
     if event.other_type:
         return f"{event.other_type} {event.other}"
-    return f"light {event.other}" if event.kind == EventKind.RED_LIGHT else ""
+    at_light = event.kind in (EventKind.RED_LIGHT, EventKind.RED_LIGHT_WIDE)
+    return f"light {event.other}" if at_light else ""
 
 
 def shown_events(record: RouteRecord, run: RunRecord) -> Iterator[EventRecord]:

@@ -26,6 +26,12 @@ _ACTOR_TYPES: Mapping[int, str] = {
     ActorKind.DEBRIS: "static.prop.dirtdebris01",
     ActorKind.VENDING_MACHINE: "static.prop.vendingmachine",
 }
+_COLLISIONS = frozenset(
+    {
+        *(EventKind.COLLISION_WALKER, EventKind.COLLISION_VEHICLE, EventKind.COLLISION_STATIC),
+        *(EventKind.FIRST_HIT_WALKER, EventKind.FIRST_HIT_VEHICLE, EventKind.FIRST_HIT_STATIC),
+    }
+)
 _TRACE_TICKS = round(TRACE_S / TICK_S)
 
 
@@ -86,7 +92,7 @@ def trace_row(view: WorldView) -> TraceRow:
 
 def event_record(event: Event, view: WorldView) -> EventRecord:
     """The event with its time, and what it met in CARLA's words."""
-    collision = EventKind.COLLISION_WALKER <= event.kind <= EventKind.COLLISION_STATIC
+    collision = event.kind in _COLLISIONS
     other = int(view.state.kind[event.other]) if collision and event.other >= 0 else 0
     default = f"vehicle.{ActorKind(other).name.lower()}" if other else ""
     return EventRecord(

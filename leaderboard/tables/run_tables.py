@@ -11,8 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from di_envs.rules import Rules, rules_named
+from di_envs.rules import DI_1_0, Rules, rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.rescoring import records_all, rescored
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
 from leaderboard.scoring.score import count_infractions, infractions_per_km
 from leaderboard.statistics.confidence import MeanInterval, mean_interval
@@ -41,26 +42,45 @@ def print_run(run: RunRecord, console: Console) -> None:
 
 
 def _route_table(run: RunRecord) -> Table:
+    ours = _by_our_rules(run)
     title = f"{escape(run.title)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
     table = Table(title=title, title_justify="left", title_style="bold")
     table.add_column("route")
-    for name in ("DS", "RC", "IS", "bound", "infr./km"):
+    for name in ("DS", *([f"DS\n{DI_1_0.name}"] if ours else []), "RC", "IS", "bound", "infr./km"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("what happened", overflow="fold")
     for route_id in dict.fromkeys(record.route_id for record in run.routes):
         records = [record for record in run.routes if record.route_id == route_id]
-        table.add_row(escape(route_id), *_cells(records, run))
+        driving, *cells = _cells(records, run)
+        own = [_driving_cell(ours, route_id)] if ours else []
+        table.add_row(escape(route_id), driving, *own, *cells)
     for route_id, why in run.refused.items():
         reason = _briefly(why.removeprefix(f"Route '{route_id}': "))
-        table.add_row(escape(route_id), *["-"] * 5, escape(f"could not be planned: {reason}"))
+        blank = ["-"] * (6 if ours else 5)
+        table.add_row(escape(route_id), *blank, escape(f"could not be planned: {reason}"))
     table.add_section()
-    table.add_row("mean", *_mean_cells(run), style="bold")
+    driving, *cells = _mean_cells(run)
+    own = [str(driving_interval(ours))] if ours else []
+    table.add_row("mean", driving, *own, *cells, style="bold")
     return table
 
 
 def _briefly(reason: str) -> str:
     """What is wrong, without what to do about it, which stands below the table."""
     return reason.partition("; ")[0].partition(". ")[0]
+
+
+def _by_our_rules(run: RunRecord) -> RunRecord | None:
+    """The run as `di-1.0` scores it; None where it is so already, or was recorded too early."""
+    if run.rules == DI_1_0.name or not records_all(run, DI_1_0):
+        return None
+    return rescored(run, DI_1_0)
+
+
+def _driving_cell(run: RunRecord, route_id: str) -> str:
+    """DS of one route, over its seeds."""
+    scores = [record.score for record in run.scored if record.route_id == route_id]
+    return f"{_mean([score.driving_score for score in scores]):.1f}" if scores else "-"
 
 
 def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
@@ -179,6 +199,8 @@ def _caption(run: RunRecord) -> str:
         f"{routes} routes of {run.town}, {driven_km:.1f} km driven; {doubt}.",
         "bound: DS of a perfect driver on empty roads with the same lights, under the timeout.",
     ]
+    if not records_all(run, DI_1_0):
+        lines.append(f"DS under {DI_1_0.name} is not known: this run's world did not record it.")
     if not run.complete:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
     return "\n".join([*lines, *_refused_lines(run), *_lost_lines(run), *run.notes])

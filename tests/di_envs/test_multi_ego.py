@@ -165,8 +165,9 @@ def test_an_ego_that_runs_into_another_counts_a_collision_for_both():
         _, _, _, _, infos = env.step({"ego_0": GO, "ego_1": STAND})
         for name, info in infos.items():
             met[name] += [(event.kind, event.other) for event in info["events"]]
-    assert met["ego_0"] == [(EventKind.COLLISION_VEHICLE, 1)]
-    assert met["ego_1"] == [(EventKind.COLLISION_VEHICLE, 0)]
+    kinds = (EventKind.FIRST_HIT_VEHICLE, EventKind.COLLISION_VEHICLE)
+    assert met["ego_0"] == [(kind, 1) for kind in kinds]
+    assert met["ego_1"] == [(kind, 0) for kind in kinds]
     assert env.step({"ego_0": GO, "ego_1": STAND})[4]["ego_1"]["infraction_penalty"] == 0.6
 
 

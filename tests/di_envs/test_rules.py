@@ -12,6 +12,7 @@ from di_envs.rules import (
     CARLA_1_0,
     CARLA_2_0,
     CARLA_2_1,
+    DI_1_0,
     RULES,
     Rules,
     rules_named,
@@ -46,6 +47,17 @@ def test_carla_2_1_adds_up_the_published_costs():
         EventKind.STOP_SIGN: 0.25,
     }
     assert CARLA_2_1.penalties.min_speed == 0.4
+
+
+def test_di_1_0_has_the_factors_of_1_0_for_what_it_sees_instead():
+    assert dict(DI_1_0.penalties.costs) == {
+        EventKind.FIRST_HIT_WALKER: 0.5,
+        EventKind.FIRST_HIT_VEHICLE: 0.6,
+        EventKind.FIRST_HIT_STATIC: 0.65,
+        EventKind.RED_LIGHT_WIDE: 0.7,
+        EventKind.STOP_SIGN: 0.8,
+    }
+    assert len(DI_1_0.infractions) == len(CARLA_1_0.infractions)
 
 
 def test_every_rule_set_says_something_of_every_event():
@@ -110,7 +122,7 @@ def test_the_environment_takes_every_rule_set_by_name_and_answers_a_typo():
 
 
 def test_each_rule_set_has_a_file_of_its_own():
-    files = {path.stem for path in Path(rules_package.__file__).parent.glob("carla_*.py")}
+    files = {path.stem for path in Path(rules_package.__file__).parent.glob("*_[0-9]_[0-9].py")}
     assert files == {name.replace("-", "_").replace(".", "_") for name in RULES}
 
 

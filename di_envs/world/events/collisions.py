@@ -1,4 +1,8 @@
-"""Which contacts of an ego count as collisions: the de-duplication of Leaderboard 1.0."""
+"""Which contacts of an ego count as collisions: the de-duplication of Leaderboard 1.0, and ours.
+
+Bodies that stay against each other have met once: only the impact counts, not the leaning. Beside
+what CARLA's rule counts, each body is recorded when an ego touches it for the first time.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +16,13 @@ from di_envs.world.state import COLLISION_MEMORY, TICK_S, ActorKind, EventKind, 
 MEMORY_TICKS = round(5.0 / TICK_S)  # for which the last actor hit is remembered
 SAME_PLACE_M = 3.0  # from a remembered place, within which nothing counts
 FORGET_PLACE_M = 5.0  # from it, beyond which it is forgotten
+APART_TICKS = round(1.0 / TICK_S)  # without touching, after which two bodies meet anew
+TOUCHED, COUNTED = 1, 2  # `state.hit`
 
 WALKER, PROP = int(ActorKind.WALKER), int(ActorKind.PROP)
+# of each the kinds for a vehicle and for what is lifeless follow, in this order
 HIT_WALKER = int(EventKind.COLLISION_WALKER)
-HIT_VEHICLE = int(EventKind.COLLISION_VEHICLE)
-HIT_STATIC = int(EventKind.COLLISION_STATIC)
+FIRST_HIT_WALKER = int(EventKind.FIRST_HIT_WALKER)
 
 
 @kernel
@@ -51,8 +57,46 @@ def _remember(state: State, ego: int, other: int) -> None:
 
 
 @kernel
-def count_collision(state: State, ego: int, other: int, out: Float64, n: int) -> int:
-    """Records a contact, unless it is with the last actor hit or near the place of another.
+def is_impact(state: State, ego: int, other: int) -> bool:
+    """Whether bodies that touch now were apart before: a contact begins, and does not go on."""
+    last = state.contact_tick[ego, other]
+    return last == 0 or state.tick[()] - last > APART_TICKS
+
+
+@kernel
+def count_contact(state: State, ego: int, other: int, out: Float64, n: int) -> int:
+    """Records what a contact counts as: a collision by CARLA's rule once, a first hit once ever.
+
+    Returns:
+        The number of rows of `out` in use.
+    """
+    if is_impact(state, ego, other):
+        again = state.last_collision_actor[ego] == other  # within 5 s: part of that collision
+        if state.hit[ego, other] == 0 and state.finished[ego] == 0:
+            x, y, z = state.x[ego], state.y[ego], state.z[ego]
+            kind = FIRST_HIT_WALKER + _class_of(state, other)
+            n = record(out, n, kind, ego, int(state.tick[()]), x, y, z, other, 0.0)
+        state.hit[ego, other] = COUNTED if again else TOUCHED
+    state.contact_tick[ego, other] = state.tick[()]
+    if state.hit[ego, other] == TOUCHED and state.finished[ego] == 0:
+        before = n
+        n = _count_collision(state, ego, other, out, n)
+        if n > before:
+            state.hit[ego, other] = COUNTED
+    return n
+
+
+@kernel
+def _class_of(state: State, other: int) -> int:
+    """0 for a walker, 1 for a vehicle, 2 for what is lifeless."""
+    if state.kind[other] == WALKER:
+        return 0
+    return 2 if state.kind[other] >= PROP else 1
+
+
+@kernel
+def _count_collision(state: State, ego: int, other: int, out: Float64, n: int) -> int:
+    """Records a contact, unless it is near the place of another.
 
     The ego's own speed plays no part: being hit while standing counts in 1.0. As the place is the
     ego's, at most one collision counts in a tick.
@@ -60,17 +104,11 @@ def count_collision(state: State, ego: int, other: int, out: Float64, n: int) ->
     Returns:
         The number of rows of `out` in use.
     """
-    if state.finished[ego] != 0 or state.last_collision_actor[ego] == other:
-        return n
     x, y, z = state.x[ego], state.y[ego], state.z[ego]
     for k in range(COLLISION_MEMORY):  # a free slot is NaN, and near nothing
         dx, dy = state.collision_places[ego, k, 0] - x, state.collision_places[ego, k, 1] - y
         if dx * dx + dy * dy <= SAME_PLACE_M * SAME_PLACE_M:
             return n
     _remember(state, ego, other)
-    kind = HIT_VEHICLE
-    if state.kind[other] == WALKER:
-        kind = HIT_WALKER
-    elif state.kind[other] >= PROP:
-        kind = HIT_STATIC
+    kind = HIT_WALKER + _class_of(state, other)
     return record(out, n, kind, ego, int(state.tick[()]), x, y, z, other, 0.0)

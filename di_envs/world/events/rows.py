@@ -7,9 +7,10 @@ from di_envs.numerics.kernels import kernel
 
 # kind, ego, tick, x, y, z, other, value: the fields of `Event`
 COLUMNS = 8
-# at most this many rows an ego and tick: one collision, one stop sign, a red light or two, the
-# metres outside lanes, too low a speed, the end of the route, a scenario
-ROWS_PER_EGO = 8
+# at most this many rows an ego and tick: one collision, bodies hit for the first time, one stop
+# sign, a red light or two by each line, the metres outside lanes, too low a speed, the end of the
+# route, a scenario
+ROWS_PER_EGO = 16
 
 
 @kernel

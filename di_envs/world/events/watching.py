@@ -1,8 +1,9 @@
 """All events of CARLA Leaderboard 1.0 for one ego and tick, each by the rule of its own module.
 
 Source: CARLA leaderboard and scenario_runner, branches `leaderboard-1.0`, of which the geometry,
-thresholds and de-duplication are kept, traps included; the minimum speed is 2.x's. Collisions are
-recorded where they happen, in `contact.resolve_contacts`.
+thresholds and de-duplication are kept, traps included; the minimum speed is 2.x's. What `di-1.0`
+sees besides is recorded beside it, under kinds of its own. Collisions are recorded where they
+happen, in `contact.resolve_contacts`.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ def begin_events(state: State, ego: int) -> None:
     state.last_collision_actor[ego] = -1
     state.last_collision_tick[ego] = 0
     state.collision_places[ego, :, :] = math.nan
+    state.contact_tick[ego, :] = 0
+    state.hit[ego, :] = 0
     state.last_red_signal[ego] = -1
+    state.last_wide_signal[ego] = -1
     state.stop_target[ego] = -1
     state.stop_done[ego] = 0
     state.stop_affected[ego] = 0

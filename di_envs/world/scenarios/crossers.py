@@ -17,7 +17,6 @@ from di_envs.town.lanes import Lanes, Signals
 from di_envs.town.lanes_below import lanes_below_box
 from di_envs.town.queries import project_to_lane
 from di_envs.world.bodies import LARGEST_M, SAME_LEVEL_M, Box, box_of, overlap
-from di_envs.world.contact import DOWN
 from di_envs.world.scenarios.steps import draw_of, end_scenario, go_to, put_actor
 from di_envs.world.scenarios.tables import (
     MACHINE_HALF_LENGTH_M,
@@ -26,9 +25,10 @@ from di_envs.world.scenarios.tables import (
     ScenarioTables,
 )
 from di_envs.world.state import OCCUPIED_LANES, TICK_S, ActorKind, State
+from di_envs.world.struck import DOWN, lie
 from di_envs.world.traffic.occupancy import Occupancy, insert_body
 from di_envs.world.walkers.crossing import BODY_M, is_in_the_way, is_vehicle
-from di_envs.world.walkers.strolling import HEIGHT_M, LIE_TICKS
+from di_envs.world.walkers.spawn import HEIGHT_M
 
 WAITING, CROSSING = 1, 2
 HIDDEN = 3  # the type with somebody behind a vending machine
@@ -85,6 +85,7 @@ def begin_crossing(
     )
     state.walk_waiting[actor] = 0
     state.still_ticks[actor] = 0
+    state.shock_ticks[actor] = 0
     if tables.type[trigger] == HIDDEN:
         place = tables.pose[slot + 1]
         put_actor(
@@ -213,9 +214,8 @@ def move_crosser(
     if state.kind[actor] == ABSENT:  # somebody took him away
         end_scenario(state, tables, signals, trigger)
         return
-    if state.kind[actor] == WALKER and state.walk_waiting[actor] == DOWN:
-        state.still_ticks[actor] += 1
-        if state.still_ticks[actor] > LIE_TICKS:
+    if state.walk_waiting[actor] == DOWN:
+        if lie(state, actor):
             end_scenario(state, tables, signals, trigger)
         return
     if state.scenario_step[trigger] != CROSSING:

@@ -20,7 +20,9 @@ from di_envs.world.walkers.lane_clearance import clearances
 BODY_M = 0.25  # half a walker's width
 KERB_M = 0.4  # that walkers keep from driving lanes at least …
 SWING_M = 1.0  # … and where there is room: long vehicles swing out that far in turns
-SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room
+SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room to its both sides …
+REACH_M = 1.25  # … from the line, up to which they go to pass each other …
+REACH_STEP_M = 0.25  # … and steps in which room for it is looked for
 SHORTEST_M = 3.0  # pieces of sidewalk that are worth walking
 STEP_M = 0.5  # spacing of the lines made here
 FINE_M = 0.1  # steps in which the kerb is looked for
@@ -28,7 +30,7 @@ ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
 MEET_M = 0.5  # ends that are the same place
 JOIN_M = 3.0  # ends that a straight line joins
 LEVEL_M = 3.0
-REACH_M = 80.0  # up to which vehicles ahead of a crosswalk are looked at
+LOOK_BACK_M = 80.0  # up to which vehicles ahead of a crosswalk are looked at
 STOP_LINE_M = 25.0  # from a crosswalk, within which a stop line guards it
 
 Line = NDArray[np.float64]  # (N, 3) x, y, z
@@ -43,7 +45,12 @@ class WalkGraph(NamedTuple):
     size: NDArray[np.int32]  # number of points
     length_m: NDArray[np.float64]
     spacing_m: NDArray[np.float64]
-    side_m: NDArray[np.float64]  # that walkers keep to the right of the line
+    # offsets to the right of the line, seen along the edge: where one walks who goes along it and
+    # against it, and how far to either side there is room
+    forth_m: NDArray[np.float64]
+    back_m: NDArray[np.float64]
+    right_m: NDArray[np.float64]
+    left_m: NDArray[np.float64]
     crosswalk: NDArray[np.int32]  # index into Crosswalks, -1 for sidewalks
     road_begin_m: NDArray[np.float64]  # stations between which it lies on driving lanes
     road_end_m: NDArray[np.float64]
@@ -68,7 +75,8 @@ class WalkGraph(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class _Edge:
     line: Line
-    side_m: float = 0.0
+    left_m: float = 0.0  # room beside the line
+    right_m: float = 0.0
     crosswalk: int = -1
     road: tuple[float, float] = (0.0, 0.0)
 
@@ -145,8 +153,38 @@ def _cut(pieces: list[Line], ends: dict[tuple[int, int], tuple[int, int]]) -> li
 
 
 def _sidewalk(lanes: Lanes, line: Line) -> _Edge:
-    room = float(clearances(lanes, line).min()) - BODY_M - SWING_M
-    return _Edge(line=line, side_m=min(max(room, 0.0), SIDE_M))
+    return _Edge(line=line, left_m=_room(lanes, line, -1), right_m=_room(lanes, line, 1))
+
+
+def _room(lanes: Lanes, line: Line, side: int) -> float:
+    """How far to one side of a line (1 right, -1 left) one walks no nearer to driving lanes.
+
+    Beyond what long vehicles swing out in turns, nearer is as good.
+    """
+    wanted = np.minimum(clearances(lanes, line), BODY_M + SWING_M) - 1e-9
+    step = np.gradient(line[:, :2], axis=0)
+    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
+    right = np.column_stack((-step[:, 1], step[:, 0], np.zeros(len(line))))
+    room = 0.0
+    for reach in np.arange(1, round(REACH_M / REACH_STEP_M) + 1) * REACH_STEP_M:
+        if (clearances(lanes, line + side * reach * right) < wanted).any():
+            break
+        room = float(reach)
+    return room
+
+
+def walking_lines(left_m: float, right_m: float) -> tuple[float, float]:
+    """Where walkers go along an edge and against it, as offsets to the right of its line [m].
+
+    They are SIDE_M to either side of a middle, which is as near the line as room allows.
+
+    Args:
+        left_m: Room to the left of the line.
+        right_m: Room to its right.
+    """
+    half = min(SIDE_M, 0.5 * (left_m + right_m))
+    middle = min(max(0.0, half - left_m), right_m - half)
+    return middle + half, middle - half
 
 
 def _links(lanes: Lanes, lines: list[Line]) -> list[_Edge]:
@@ -182,8 +220,8 @@ def _crossings(
         start, end = crosswalks.start[crosswalk], crosswalks.end[crosswalk]
         line = _resample(np.stack((a, start, end, b)))
         road = _road_part(lanes, line)
-        side = min(SIDE_M, max(0.5 * crosswalks.width_m[crosswalk] - BODY_M, 0.0))
-        edges.append(_Edge(line=line, side_m=side, crosswalk=crosswalk, road=road))
+        side = max(0.5 * float(crosswalks.width_m[crosswalk]) - BODY_M, 0.0)
+        edges.append(_Edge(line=line, left_m=side, right_m=side, crosswalk=crosswalk, road=road))
     return edges
 
 
@@ -213,12 +251,16 @@ def _resample(line: Line) -> Line:
 def _edge_arrays(edges: list[_Edge]) -> dict[str, Any]:
     count = np.array([len(edge.line) for edge in edges], np.int32)
     length = np.array([_length(edge.line) for edge in edges])
+    ways = np.array([walking_lines(edge.left_m, edge.right_m) for edge in edges]).reshape(-1, 2)
     return {
         "first": (np.cumsum(count) - count).astype(np.int32),
         "size": count,
         "length_m": length,
         "spacing_m": length / np.maximum(count - 1, 1),
-        "side_m": np.array([edge.side_m for edge in edges], np.float64),
+        "forth_m": np.ascontiguousarray(ways[:, 0]),
+        "back_m": np.ascontiguousarray(ways[:, 1]),
+        "right_m": np.array([edge.right_m for edge in edges], np.float64),
+        "left_m": np.array([edge.left_m for edge in edges], np.float64),
         "crosswalk": np.array([edge.crosswalk for edge in edges], np.int32),
         "road_begin_m": np.array([edge.road[0] for edge in edges], np.float64),
         "road_end_m": np.array([edge.road[1] for edge in edges], np.float64),
@@ -307,7 +349,7 @@ def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> dict[str, Any]:
                 lane = front.pop(0)
                 rows[lane].append((crosswalk, crossed, begin[lane], begin[lane] + depth))
                 for before in _linked(lanes.predecessor_start, lanes.predecessor, lane):
-                    if begin[lane] < REACH_M and before not in begin:
+                    if begin[lane] < LOOK_BACK_M and before not in begin:
                         begin[before] = begin[lane] + float(lanes.length_m[before])
                         front.append(before)
     flat = [row for own in rows for row in own]

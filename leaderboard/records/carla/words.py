@@ -20,13 +20,17 @@ from leaderboard.records.record import (
 )
 from leaderboard.scoring.score import share_of_distance
 
-# (event, key of its list, label of its rate)
+# (event, key of its list, label of its rate); no rule set counts two events of one list
 KEYS: Mapping[EventKind, tuple[str, str]] = MappingProxyType(
     {
         EventKind.COLLISION_WALKER: ("collisions_pedestrian", "Collisions with pedestrians"),
         EventKind.COLLISION_VEHICLE: ("collisions_vehicle", "Collisions with vehicles"),
         EventKind.COLLISION_STATIC: ("collisions_layout", "Collisions with layout"),
         EventKind.RED_LIGHT: ("red_light", "Red lights infractions"),
+        EventKind.FIRST_HIT_WALKER: ("collisions_pedestrian", "Collisions with pedestrians"),
+        EventKind.FIRST_HIT_VEHICLE: ("collisions_vehicle", "Collisions with vehicles"),
+        EventKind.FIRST_HIT_STATIC: ("collisions_layout", "Collisions with layout"),
+        EventKind.RED_LIGHT_WIDE: ("red_light", "Red lights infractions"),
         EventKind.STOP_SIGN: ("stop_infraction", "Stop sign infractions"),
         EventKind.OUTSIDE_LANES: ("outside_route_lanes", "Off-road infractions"),
         EventKind.ROUTE_DEVIATION: ("route_dev", "Route deviations"),
@@ -87,7 +91,7 @@ def infraction_messages(record: RouteRecord, rules: Rules) -> dict[str, list[str
 def _message(event: EventRecord, record: RouteRecord) -> str:
     place = f"(x={round(event.x, 3)}, y={round(event.y, 3)}, z={round(event.z, 3)})"
     match event.kind:
-        case EventKind.RED_LIGHT:
+        case EventKind.RED_LIGHT | EventKind.RED_LIGHT_WIDE:
             return f"Agent ran a red light {event.other} at {place}"
         case EventKind.STOP_SIGN:
             return f"Agent ran a stop with id={event.other} at {place}"

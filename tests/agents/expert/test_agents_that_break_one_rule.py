@@ -30,6 +30,7 @@ STANDING_MPS = 0.1
 LEFT_M = 0.0015  # between bodies that were pushed apart
 SIGN_REACH_M = 20.0 + 4.0  # the rule looks 20 m ahead, for the 4 m box before the line
 RED, STOP = EventKind.RED_LIGHT, EventKind.STOP_SIGN
+WIDE, FIRST_HIT = EventKind.RED_LIGHT_WIDE, EventKind.FIRST_HIT_VEHICLE
 
 
 class LineWatch(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -149,11 +150,12 @@ def by_kind(record: RouteRecord) -> Counter[EventKind]:
 
 
 def assert_scores(record: RouteRecord, *, times: int, factor: float, weight: float) -> None:
-    """A completed route that lost a factor (1.0, 2.0) or a weight (2.1) so many times."""
+    """A completed route that lost a factor, or in 2.1 a weight, so many times."""
     expected = {
         "carla-1.0": factor**times,
         "carla-2.0": factor**times,
         "carla-2.1": 1.0 / (1.0 + weight * times),
+        "di-1.0": factor**times,
     }
     for name, penalty in expected.items():
         score = rescored_route(record, RULES[name]).score
@@ -177,7 +179,7 @@ def test_who_ignores_lights_pays_for_each_red_that_its_tail_crosses_and_for_noth
         record = drive(quiet, "expert-redrunner", route)
         assert [e.other for e in record.events if e.kind == RED] == quiet.reds_run
         reds = len(quiet.reds_run)
-        assert by_kind(record) == {RED: reds, EventKind.COMPLETED: 1}
+        assert by_kind(record) == {RED: reds, WIDE: reds, EventKind.COMPLETED: 1}
         assert quiet.signs_passed[False] == []
         assert_scores(record, times=reds, factor=0.7, weight=0.4)
         total, passed = total + reds, passed + quiet.lights_passed
@@ -217,11 +219,13 @@ def test_who_ignores_others_pays_for_those_it_touches_and_the_expert_touches_nob
     for tick, other, x, y in watch.touches:  # what is not fined is remembered
         assert any(
             (hit.other == other and 0 <= tick - hit.tick <= 5.0 / TICK_S)
+            or any(other == who and 0 < tick - when <= 1.0 / TICK_S for when, who in places)
             or (hit.tick < tick and math.dist((x, y), places[hit.tick, hit.other]) <= 5.0)
             for hit in hits
         )
     slow = [e.value / 100.0 for e in record.events if e.kind == EventKind.MIN_SPEED]
-    kinds = {EventKind.COLLISION_VEHICLE: len(hits), EventKind.COMPLETED: 1}
+    bodies = len({other for _, other, _, _ in watch.touches})
+    kinds = {EventKind.COLLISION_VEHICLE: len(hits), FIRST_HIT: bodies, EventKind.COMPLETED: 1}
     assert by_kind(record) == kinds | {EventKind.MIN_SPEED: len(slow)}
     assert len(hits) >= 3
     # 2.x fines slowness too: by up to 0.3 of the score, or 0.4 of the sum
@@ -229,6 +233,7 @@ def test_who_ignores_others_pays_for_those_it_touches_and_the_expert_touches_nob
         "carla-1.0": 0.6 ** len(hits),
         "carla-2.0": 0.6 ** len(hits) * math.prod(1.0 - 0.3 * (1.0 - p) for p in slow),
         "carla-2.1": 1.0 / (1.0 + 0.7 * len(hits) + sum(0.4 * (1.0 - p) for p in slow)),
+        "di-1.0": 0.6**bodies,
     }
     for name, penalty in expected.items():
         score = rescored_route(record, RULES[name]).score

@@ -33,10 +33,12 @@ NO_SIGNALS = make_signals(SignalKind.YIELD)  # a kind that no rule looks at
 class Street:
     """Puts one ego somewhere, tick by tick, and collects what is detected.
 
-    The first place is where it has come to on its route, unless `follows` is off.
+    The first place is where it has come to on its route, unless `follows` is off. What `di-1.0`
+    sees of red lights in the place of CARLA's rules is left out unless `wide` is on.
     """
 
-    def __init__(self, signals=NO_SIGNALS, lanes=None, routes=None, follows=True):
+    def __init__(self, signals=NO_SIGNALS, lanes=None, routes=None, follows=True, wide=False):
+        self.unseen = () if wide else (EventKind.RED_LIGHT_WIDE,)
         self.state = make_state()
         self.signals = signals
         self.lanes = lanes or make_lanes()
@@ -55,8 +57,9 @@ class Street:
         locate_ego(state, self.lanes, 0)
         advance_progress(state, self.routes, 0)
         n = detect_events(state, self.lanes, self.signals, self.routes, 0, 1, out, 0)
-        self.rows += list(out[:n])
-        return [EventKind(int(row[0])) for row in out[:n]]
+        seen = [row for row in out[:n] if row[0] not in self.unseen]
+        self.rows += seen
+        return [EventKind(int(row[0])) for row in seen]
 
     def start_at(self, point):
         for index in ("route_index", "deviation_index", "outside_index"):
@@ -126,6 +129,42 @@ def test_the_stop_line_spans_four_tenths_of_the_lane_to_each_side():
     for y, fined in ((1.39, True), (1.41, False)):  # 0.4 * 3.5 = 1.4
         street = Street(make_signals())
         assert (street.drive(95.0, 110.0, y=y) == [EventKind.RED_LIGHT]) == fined
+
+
+# the eastbound lanes lie from y = -1.75 to 5.25, the oncoming one beyond y = -1.75
+@pytest.mark.parametrize(
+    ("y", "short", "wide"),
+    [
+        (0.0, True, True),
+        (1.39, True, True),
+        (1.41, False, True),  # at the edge of the lane
+        (1.75, False, True),  # between the lanes
+        (5.2, False, True),
+        (6.54, False, True),  # beside the road, by less than 1.3 m
+        (6.56, False, False),  # further out metres outside the lanes are counted
+        (-1.8, False, True),  # on the wrong side of the road
+        (-3.04, False, True),
+        (-3.06, False, False),
+    ],
+)
+def test_the_wide_line_has_no_edge_at_which_a_red_light_is_free(y, short, wide):
+    street = Street(make_signals(), wide=True)
+    fined = street.drive(95.0, 110.0, y=y)
+    assert (EventKind.RED_LIGHT in fined) == short
+    assert fined.count(EventKind.RED_LIGHT_WIDE) == wide
+
+
+def test_a_lane_beside_that_goes_by_no_light_is_free_of_the_wide_line():
+    signals = make_signals()
+    signals = signals._replace(stop_signal=np.array([0, -1], np.int32))
+    street = Street(signals, wide=True)
+    assert street.drive(95.0, 110.0, y=2.0) == []  # on the right lane, 2 m from the left one's line
+
+
+def test_the_wide_line_fines_once_for_each_time_the_light_was_not_the_last():
+    street = Street(make_signals(), wide=True)
+    assert street.drive(90.0, 110.0, y=1.5) == [EventKind.RED_LIGHT_WIDE]
+    assert street.drive(90.0, 110.0) == [EventKind.RED_LIGHT]
 
 
 @pytest.mark.parametrize(("share", "fined"), [(0.5, True), (0.9, False), (1.0, False)])

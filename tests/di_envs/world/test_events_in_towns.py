@@ -66,7 +66,7 @@ def test_every_stop_line_fines_who_runs_it(name, request):
         under_red = fines(town, state, poses, LightState.RED)
         under_green = fines(town, state, poses, LightState.GREEN)
         expected = {
-            SignalKind.LIGHT: [(EventKind.RED_LIGHT, signal)],
+            SignalKind.LIGHT: [(EventKind.RED_LIGHT, signal), (EventKind.RED_LIGHT_WIDE, signal)],
             SignalKind.STOP: [(EventKind.STOP_SIGN, signal)],
         }.get(SignalKind(signals.kind[signal]), [])
         allowed = expected if signals.kind[signal] == SignalKind.STOP else []

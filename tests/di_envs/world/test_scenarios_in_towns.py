@@ -32,7 +32,13 @@ def common_part(state: State, actors: int) -> dict[str, bytes]:
     """Every field, without the slots of scenarios and what only triggers have."""
     longer = state.kind.size
     return {
-        name: (field[:actors] if field.ndim and field.shape[0] == longer else field).tobytes()
+        name: (
+            field[:, :actors]
+            if name in ("contact_tick", "hit")  # by ego and actor
+            else field[:actors]
+            if field.ndim and field.shape[0] == longer
+            else field
+        ).tobytes()
         for name, field in zip(state._fields, state, strict=True)
         if name not in ("nearest_index", "scenario_step", "scenario_tick", "scenario_m")
     }

@@ -9,18 +9,16 @@ import pytest
 from di_envs.numerics.geometry import boxes_overlap
 from di_envs.town.lanes import Crosswalks, LaneKind, LightState, SignalKind
 from di_envs.town.loading import load_town
-from di_envs.world.contact import DOWN
 from di_envs.world.state import TICK_S, ActorKind
+from di_envs.world.struck import strike
 from di_envs.world.walkers.crossing import could_stop, ticks_to_green
 from di_envs.world.walkers.lane_clearance import clearances
+from di_envs.world.walkers.neighbours import make_neighbours
+from di_envs.world.walkers.on_edges import mark_busy_crosswalks, place_on_edge
 from di_envs.world.walkers.personal_space import CLEAR_M
-from di_envs.world.walkers.strolling import (
-    mark_busy_crosswalks,
-    move_walkers,
-    place_on_edge,
-    spawn_walkers,
-)
-from di_envs.world.walkers.walk_graph import build_walk_graph
+from di_envs.world.walkers.spawn import spawn_walkers
+from di_envs.world.walkers.strolling import move_walkers
+from di_envs.world.walkers.walk_graph import build_walk_graph, walking_lines
 from di_envs.world.world import World, WorldConfig
 from tests.di_envs.world.small_world import (
     EAST,
@@ -60,6 +58,11 @@ WITH_LIGHT = replace(OPEN, signals=make_signals())
 KERB = 10.0 - 5.25 - 1.25  # station at which walkers from the south wait
 
 
+def walk_on(state, walk, first, end, signals=NO_SIGNALS):
+    """One tick of the walkers [first, end)."""
+    move_walkers(state, walk, signals, make_neighbours(state.kind.size), first, end)
+
+
 class Crossing:
     """One walker (actor 2) at the southern kerb, an ego (0, absent) and a vehicle (1, absent)."""
 
@@ -76,7 +79,7 @@ class Crossing:
     def tick(self, ticks=1):
         for _ in range(ticks):
             self.state.tick[()] += 1
-            move_walkers(self.state, self.walk, self.town.signals, 2, 3)
+            walk_on(self.state, self.walk, 2, 3, self.town.signals)
             mark_busy_crosswalks(self.state, self.walk, self.busy)
 
     def go(self, edge, station, direction=1, walker=2):
@@ -163,7 +166,7 @@ def test_a_town_without_sidewalks_has_no_walkers():
     state = make_state(walkers=3)
     spawn_walkers(state, walk, 1, 3)
     assert list(state.kind[1:]) == [ActorKind.ABSENT] * 3
-    move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+    walk_on(state, walk, 1, state.kind.size)
 
 
 # strolling
@@ -227,15 +230,16 @@ def test_a_fast_walker_does_not_walk_into_a_slow_one():
         state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
     for _ in range(1000):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+        walk_on(state, walk, 1, state.kind.size)
         assert state.walk_m[1] - state.walk_m[2] > CLEAR_M
     assert state.walk_m[1] == pytest.approx(50.0)
     assert state.walk_m[2] > 47.0
 
 
-def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_one_turns_back():
+def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_turn_back():
     walk = build_walk_graph(OPEN)
-    walk = walk._replace(side_m=np.zeros_like(walk.side_m))
+    no_room = dict.fromkeys(("forth_m", "back_m", "left_m", "right_m"), np.zeros(walk.size.size))
+    walk = walk._replace(**no_room)
     state = make_state(walkers=2)
     spawn_walkers(state, walk, 1, 2)
     edge = int(np.flatnonzero(walk.length_m == 80.0)[0])
@@ -248,11 +252,92 @@ def test_two_who_meet_where_there_is_no_room_to_pass_stop_and_one_turns_back():
     gaps = []
     for _ in range(300):
         state.tick[()] += 1
-        move_walkers(state, walk, NO_SIGNALS, 1, state.kind.size)
+        walk_on(state, walk, 1, state.kind.size)
         gaps.append(abs(state.x[1] - state.x[2]))
     assert CLEAR_M <= min(gaps) < CLEAR_M + 0.1
-    assert state.walk_direction[1] == state.walk_direction[2]
+    assert list(state.walk_direction[1:]) != [1, -1]
     assert state.speed[1:].min() > 0.9
+
+
+def two_who_meet(walk, stations=(10.0, 20.0), directions=(1, -1), lateral=0.0):
+    """Two walkers (actors 1 and 2) on the line of one sidewalk, `lateral` metres to its right."""
+    walk = walk._replace(
+        forth_m=np.full(walk.size.size, lateral), back_m=np.full(walk.size.size, lateral)
+    )
+    state = make_state(walkers=2)
+    spawn_walkers(state, walk, 1, 2)
+    edge = int(np.flatnonzero(walk.length_m == 80.0)[0])
+    state.desired_factor[1:] = 1.0
+    for walker, station, direction in zip((1, 2), stations, directions, strict=True):
+        state.walk_edge[walker], state.walk_m[walker] = edge, station
+        state.walk_direction[walker] = direction
+        place = place_on_edge(walk, edge, station, direction)
+        state.x[walker], state.y[walker], state.z[walker], state.yaw[walker] = place
+    return state, walk
+
+
+def test_two_who_meet_on_one_line_step_to_their_right_and_pass():
+    state, walk = two_who_meet(build_walk_graph(OPEN))
+    aside = np.zeros(2)
+    for _ in range(300):
+        state.tick[()] += 1
+        walk_on(state, walk, 1, 3)
+        assert math.hypot(state.x[1] - state.x[2], state.y[1] - state.y[2]) >= CLEAR_M - 1e-9
+        right = (state.y[1:] - 10.0) * state.walk_direction[1:]  # heading east it is south
+        aside = np.maximum(aside, right)
+        assert right.min() > -0.2
+    assert list(state.walk_direction[1:]) == [1, -1]
+    assert state.walk_m[1] > 23.0
+    assert state.walk_m[2] < 7.0
+    assert aside.max() < 0.8
+
+
+def test_where_the_right_is_the_road_one_steps_to_the_left():
+    walk = build_walk_graph(OPEN)
+    walk = walk._replace(right_m=np.zeros(walk.size.size))  # south of the line is no room
+    state, walk = two_who_meet(walk)
+    for _ in range(300):
+        state.tick[()] += 1
+        walk_on(state, walk, 1, 3)
+        assert (state.y[1:] - 10.0).max() < 0.05
+    assert state.walk_m[1] > 22.0
+    assert state.walk_m[2] < 8.0
+
+
+def test_one_who_stands_in_the_way_is_gone_round():
+    state, walk = two_who_meet(build_walk_graph(OPEN))
+    strike(state, 2)
+    for _ in range(180):
+        state.tick[()] += 1
+        walk_on(state, walk, 1, 3)
+    assert state.x[1] > 18.0
+    assert list(state.walk_direction[1:]) == [1, -1]
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "forth", "back"),
+    [
+        (1.25, 1.25, 0.5, -0.5),  # room on both sides: half a metre to each
+        (1.25, 0.0, 0.0, -1.0),  # a road on the right: a metre between them all the same
+        (0.25, 1.25, 0.75, -0.25),
+        (0.25, 0.25, 0.25, -0.25),  # as far apart as there is room
+        (0.0, 0.0, 0.0, 0.0),
+    ],
+)
+def test_walkers_go_and_come_on_lines_a_metre_apart_where_there_is_room(left, right, forth, back):
+    assert walking_lines(left, right) == (forth, back)
+
+
+def test_a_sidewalk_beside_a_road_has_its_room_on_the_other_side():
+    lanes = make_lanes(
+        (
+            LaneSpec(start=(0, 0), end=(100, 0), road=0, lane_id=-1),
+            LaneSpec(start=(0, 2.75), end=(100, 2.75), road=0, lane_id=-2, kind=LaneKind.SIDEWALK),
+        )
+    )
+    walk = build_walk_graph(make_town(lanes))  # the line is 1 m from the lane; heading east
+    assert (walk.left_m[0], walk.right_m[0]) == (0.0, 1.25)
+    assert (walk.forth_m[0], walk.back_m[0]) == (1.0, 0.0)
 
 
 def test_walkers_turn_round_where_a_sidewalk_ends():
@@ -399,7 +484,7 @@ def test_who_waits_for_forty_seconds_turns_back():
 def test_who_was_knocked_down_lies_for_ten_seconds():
     crossing = Crossing()
     crossing.tick(40)
-    crossing.state.walk_waiting[2] = DOWN
+    strike(crossing.state, 2)
     crossing.tick(200)
     assert crossing.state.kind[2] == ActorKind.WALKER
     assert crossing.busy[0]
@@ -447,6 +532,25 @@ def test_traffic_never_touches_a_walker_and_walkers_do_cross(name, vehicles):
     assert crossed >= 10
 
 
+@pytest.mark.parametrize(("walkers", "seed"), [(60, 0), (120, 1)])
+def test_nobody_is_stuck_for_two_minutes(walkers, seed):
+    """Ten minutes of the shipped town; who stays within three metres gets nowhere."""
+    world = World(load_town("town05"), WorldConfig(vehicles=120, walkers=walkers))
+    world.reset(seed, [])
+    state, slots = world.view.state, slice(120, 120 + walkers)
+    anchor, since = np.column_stack((state.x, state.y))[slots], np.zeros(walkers)
+    for second in range(600):
+        world.advance(np.zeros((0, 3)), 20)
+        here = np.column_stack((state.x, state.y))[slots]
+        gone = np.hypot(*(here - anchor).T) > 3.0
+        anchor[gone], since[gone] = here[gone], second
+        assert second - since.min() <= 120.0
+        apart = np.hypot(*(here[:, None] - here[None]).T) + 9.0 * np.eye(walkers)
+        level = np.abs(state.z[slots, None] - state.z[None, slots]) < 3.0
+        assert apart[level].min() >= CLEAR_M - 1e-9
+    assert (state.kind[slots] == ActorKind.WALKER).all()
+
+
 def test_walkers_stroll_on_the_real_town05_which_has_no_crosswalks(shared):
     town = load_town(shared / "data" / "xodr" / "Town05.xodr", signals="none")
     walk = build_walk_graph(town)
@@ -457,7 +561,7 @@ def test_walkers_stroll_on_the_real_town05_which_has_no_crosswalks(shared):
     spawn_walkers(state, walk, 1, 60)
     for _ in range(1200):
         state.tick[()] += 1
-        move_walkers(state, walk, town.signals, 1, 61)
+        walk_on(state, walk, 1, 61, town.signals)
     places = np.column_stack((state.x, state.y, state.z))[1:]
     assert clearances(town.lanes, places).min() >= 0.25 + 0.4 - 1e-6
     assert (state.kind[1:] == ActorKind.WALKER).all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1
+from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1, DI_1_0
 from di_envs.world.kinds import EventKind
 from leaderboard.commands.cli import main
 from leaderboard.records.record import AGENT_CRASHED, WORKER_DIED
@@ -25,6 +25,28 @@ def test_a_red_light_at_half_the_traffics_pace_under_each_rule_set():
     assert rescored_route(DRIVEN, CARLA_1_0) == DRIVEN
     assert rescored_route(DRIVEN, CARLA_2_0).score.infraction_score == pytest.approx(0.7 * 0.85)
     assert rescored_route(DRIVEN, CARLA_2_1).score.infraction_score == pytest.approx(1 / 1.6)
+
+
+HIT_TWICE = (
+    *(event(EventKind.FIRST_HIT_VEHICLE), event(EventKind.COLLISION_VEHICLE)),
+    *(event(EventKind.COLLISION_VEHICLE), event(EventKind.COMPLETED)),
+)
+OF_WORLD_2 = {"python": "3.11", "numpy": "2.4.6", "world": "2"}
+
+
+def test_a_body_hit_twice_counts_once_under_di_1_0_from_the_same_record():
+    run = run_of(
+        route(score=Score(route_completion=100.0, infraction_score=0.36), events=HIT_TWICE),
+        versions=OF_WORLD_2,
+    )
+    ours = rescored(run, DI_1_0)
+    assert ours.routes[0].score.driving_score == pytest.approx(60.0)
+    assert rescored(ours, CARLA_1_0) == run
+
+
+def test_a_run_of_a_world_that_did_not_record_what_di_1_0_counts_is_refused():
+    with pytest.raises(ValueError, match="from version 2 on, and this run is of version 1"):
+        rescored(run_of(DRIVEN), DI_1_0)
 
 
 def test_there_and_back_again_is_the_same_to_the_bit():

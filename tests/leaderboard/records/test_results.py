@@ -416,6 +416,16 @@ def test_the_table_shows_scores_bound_track_and_what_happened():
         "1 red light, 1 timeout",
     ]
     assert "one seed (0): no confidence interval" in text
+    assert "DS under di-1.0 is not known" in text
+
+
+def test_the_table_has_the_score_by_our_rules_beside_that_by_carla_s():
+    twice = [event(EventKind.COLLISION_VEHICLE)] * 2 + [event(EventKind.FIRST_HIT_VEHICLE)]
+    hit = route(score=Score(route_completion=100.0, infraction_score=0.36), events=tuple(twice))
+    text = _text(run_of(hit, seeds=(0,), versions={"world": "2"}))
+    row = next(line for line in text.splitlines() if line.startswith("│ 7 "))
+    assert [cell.strip() for cell in row.strip("│").split("│")][1:3] == ["36.0", "60.0"]
+    assert "is not known" not in text
 
 
 def test_the_table_counts_the_scenarios_that_began_by_type():

@@ -16,7 +16,7 @@ from hypothesis.strategies import (
     sampled_from,
 )
 
-from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1, RULES
+from di_envs.rules import CARLA_1_0, CARLA_2_0, CARLA_2_1, DI_1_0, RULES
 from di_envs.world.state import EventKind
 from leaderboard.scoring.score import (
     Progress,
@@ -158,6 +158,20 @@ def test_scores_are_those_worked_by_hand(events, done_m, one, two, two_one):
         score = score_route(happened, progress, rules)
         assert score.infraction_score == pytest.approx(expected, abs=1e-12)
         assert score.driving_score == pytest.approx(done_m / 10.0 * expected, abs=1e-9)
+
+
+def test_one_drive_scores_by_each_rule_set_from_what_that_one_sees():
+    """A walker hit, again after five seconds, and a red light passed at the lane's edge."""
+    events = [
+        Happened(EventKind.COLLISION_WALKER),
+        Happened(EventKind.FIRST_HIT_WALKER),
+        Happened(EventKind.COLLISION_WALKER),
+        Happened(EventKind.RED_LIGHT_WIDE),
+    ]
+    assert score_route(events, FINISHED, CARLA_1_0).driving_score == pytest.approx(25.0)
+    assert score_route(events, FINISHED, DI_1_0).driving_score == pytest.approx(35.0)
+    assert count_infractions([e.kind for e in events], CARLA_1_0)[EventKind.RED_LIGHT] == 0
+    assert count_infractions([e.kind for e in events], DI_1_0)[EventKind.FIRST_HIT_WALKER] == 1
 
 
 def test_rules_2_round_the_completion_to_two_decimals():
