@@ -32,6 +32,7 @@ READER_MODULES = (
     "reading.arms",
     "reading.conflicts",
     "reading.crosswalks",
+    "reading.guessing",
     "reading.links",
     "reading.map_signals",
     "reading.network",

@@ -7,8 +7,9 @@ import warnings
 from pathlib import Path
 
 from di_envs.town import cache
-from di_envs.town.lanes import Lanes
+from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.crosswalks import find_crosswalks
+from di_envs.town.reading.guessing import guessed_heads
 from di_envs.town.reading.map_signals import heads_in_map
 from di_envs.town.reading.network import build_lanes, junction_names
 from di_envs.town.reading.opendrive import read_opendrive
@@ -16,7 +17,6 @@ from di_envs.town.reading.records import OpenDrive
 from di_envs.town.reading.sampling import LaneGeometry
 from di_envs.town.reading.sidecar import (
     enforced_limits,
-    guessed_heads,
     heads_of_sidecar,
     read_sidecar,
 )
@@ -46,7 +46,8 @@ def load_town(
         signals: Where signals come from. None: the map; a map that carries none gives a warning.
             "town05": the shipped sidecar for CARLA's own Town05, of any year. A file: a sidecar
             (`di_envs.town.reading.sidecar` has its format). "synthesise": a guess from the
-            junctions' shapes. "none": there are none.
+            junctions' shapes (`di_envs.town.reading.guessing`); a warning says what it made.
+            "none": there are none.
         cache_folder: Where parsed towns are kept; by default the user's cache folder.
 
     Raises:
@@ -67,6 +68,8 @@ def load_town(
         cache.store(loaded, folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
+    if source == SYNTHESISE:
+        warnings.warn(_what_was_guessed(path, loaded), UserWarning, stacklevel=2)
     return loaded
 
 
@@ -138,4 +141,15 @@ def _no_signals_advice(path: Path) -> str:
         f"{path.name} carries no traffic signals, so nobody has to stop. Pass signals='town05' "
         "(for CARLA's own Town05), signals='synthesise' (a guess from the junctions' shapes), a "
         "sidecar file, or signals='none' to say that this is meant."
+    )
+
+
+def _what_was_guessed(path: Path, town: Town) -> str:
+    kinds, junctions = town.signals.kind, len(town.junction_names)
+    lit = int((town.signals.groups > 0).sum())
+    lights, stops = (int((kinds == kind).sum()) for kind in (SignalKind.LIGHT, SignalKind.STOP))
+    signed = len(set(town.signals.junction[kinds == SignalKind.STOP].tolist()))
+    return (
+        f"{path.name}: signals='synthesise' made {lights} lights at {lit} and {stops} stop signs "
+        f"at {signed} of the map's {junctions} junctions, guessed from their shapes."
     )
