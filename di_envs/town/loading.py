@@ -9,6 +9,7 @@ from pathlib import Path
 from di_envs.town import cache
 from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.crosswalks import find_crosswalks
+from di_envs.town.reading.elements import decode_xml
 from di_envs.town.reading.guessing import guessed_heads
 from di_envs.town.reading.map_signals import heads_in_map
 from di_envs.town.reading.network import build_lanes, junction_names
@@ -60,11 +61,10 @@ def load_town(
     told = sidecar.read_bytes() if sidecar is not None else b""
     key = cache.content_hash(content, source.encode() + b"\0" + told)
     folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
-    # Undecodable bytes are the parser's to complain about.
-    text = content.decode("utf-8", errors="replace")
+    text = decode_xml(content, str(path))
     loaded = cache.load_cached(key, path.stem, text, folder)
     if loaded is None:
-        loaded = cache.freeze(_parse(path, content, text, source, sidecar, key))
+        loaded = cache.freeze(_parse(path, text, source, sidecar, key))
         cache.store(loaded, folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
@@ -73,10 +73,8 @@ def load_town(
     return loaded
 
 
-def _parse(
-    path: Path, content: bytes, text: str, source: str, sidecar: Path | None, key: str
-) -> Town:
-    document = read_opendrive(content, str(path))
+def _parse(path: Path, text: str, source: str, sidecar: Path | None, key: str) -> Town:
+    document = read_opendrive(text, str(path))
     lanes, geometry, stretches = build_lanes(document, str(path))
     names = junction_names(document)
     heads = _heads(document, lanes, stretches, geometry, source, sidecar)
