@@ -17,6 +17,8 @@ from di_envs.town.reading.stretches import Record, Stretch
 
 SPACING = 0.5  # m, the greatest between two points of a lane
 MOST_LANE_M = 5e6  # of all lanes together: ten million points
+# A lane round a corner may be longer than its reference line, but not by any factor.
+LONGER_THAN_ROAD, LONGER_M = 20.0, 500.0
 MINIMUM_LANE_LENGTH = 1e-3  # m; keeps spacings positive where a section has no length
 
 
@@ -168,7 +170,7 @@ def _even_stations(
     geometry: LaneGeometry, begin: Float64, end: Float64, forward: Bool
 ) -> tuple[Int64, Float64]:
     """Stations whose lane-centre points are evenly spaced: first along the road, then along it."""
-    _check_lengths(geometry, end - begin)
+    _check_lengths(geometry, end - begin, end - begin)
     lane, fraction = _grid(np.maximum(np.ceil((end - begin) / SPACING).astype(int) + 1, 2))
     station = begin[lane] + fraction * (end - begin)[lane]
     x, y = geometry.centre(lane, station)[:2]
@@ -178,26 +180,32 @@ def _even_stations(
     starts = np.searchsorted(lane, np.arange(len(begin)))
     ends = np.append(starts[1:], len(lane)) - 1
     length = arc[ends] - arc[starts]
-    _check_lengths(geometry, length)
+    _check_lengths(geometry, length, end - begin)
     lane, fraction = _grid(np.maximum(np.ceil(length / SPACING - 1e-9).astype(int) + 1, 2))
     fraction = np.where(forward[lane], fraction, 1.0 - fraction)
     even = np.interp(arc[starts[lane]] + fraction * length[lane], arc, station)
     return lane, np.clip(even, begin[lane], end[lane])
 
 
-def _check_lengths(geometry: LaneGeometry, length: Float64) -> None:
-    """Refuses (L,) lengths of lanes that no road has, before they ask for memory.
+def _check_lengths(geometry: LaneGeometry, length: Float64, along: Float64) -> None:
+    """Refuses lanes that no road has, before they ask for memory.
+
+    Args:
+        geometry: The lanes.
+        length: (L,) lengths [m].
+        along: (L,) those of their stretches of reference line.
 
     Raises:
         ValueError: With the road whose lane is the longest.
     """
-    total = float(length.sum()) if np.isfinite(length).all() else np.inf
-    if total > MOST_LANE_M:
-        longest = int(np.argmax(np.where(np.isfinite(length), length, np.inf)))
+    known = np.where(np.isfinite(length), length, np.inf)
+    longer = known > LONGER_THAN_ROAD * along + LONGER_M
+    if longer.any() or known.sum() > MOST_LANE_M:
+        worst = int(np.argmax(np.where(longer, known, 0.0) if longer.any() else known))
         raise geometry.out_of_proportion(
-            longest,
-            f"its longest lane would measure {length[longest]:g} m, all lanes together {total:g} m,"
-            f" of {MOST_LANE_M:g} m at most",
+            worst,
+            f"a lane of it would measure {length[worst]:g} m over {along[worst]:g} m of road, all "
+            f"lanes together {known.sum():g} m (of {MOST_LANE_M:g} m at most)",
         )
 
 
