@@ -1,7 +1,8 @@
 """Signals guessed from the shape of junctions, for maps that carry none.
 
 Lights stand where roads cross and at least three arms are main ones: of two lanes or more, or
-faster than a residential street. Where side streets cross or join a main road they stop; where no
+faster than a residential street. They stand too where two roads of several lanes join at an angle,
+but for roundabouts. Where side streets cross or join a main road they stop; where no
 arm is a main one, all stop (at a T: its stem). A ramp that merges at an acute angle, and every
 other junction where nothing crosses and nobody joins at an angle, has nothing.
 """
@@ -18,6 +19,7 @@ RESIDENTIAL_MPS = 32.5 / 3.6  # 30 km/h, 20 mph: a single lane no faster is no m
 MAIN_ARMS = 3  # so many main arms that cross have lights
 CROSSING_ARMS = 4  # at so many arms without a main road everybody stops
 CROSSING_SINE = 0.3  # lanes that meet flatter than this run side by side
+RING_M = 150.0  # a way round a roundabout, shorter than one round a block
 MERGE_COSINE = 0.5  # an arm that points so far the way of another merges into it
 
 Exit = tuple[int, bool]  # road, whether its lane ids are positive
@@ -35,7 +37,9 @@ def guessed_kinds(lanes: Lanes, junction: int, arms: list[Arm]) -> list[SignalKi
     """What stands at each arm of a junction."""
     main = [_is_main(lanes, arm) for arm in arms]
     crossing = len(arms) >= MAIN_ARMS and roads_cross(lanes, junction, arms)
-    if crossing and sum(main) >= MAIN_ARMS:
+    if (crossing and sum(main) >= MAIN_ARMS) or (
+        _wide_roads_join(lanes, junction, arms) and not _is_on_a_ring(lanes, junction)
+    ):
         return [SignalKind.LIGHT] * len(arms)
     stem = stem_of(arms)
     if crossing and any(main):
@@ -58,13 +62,8 @@ def roads_cross(lanes: Lanes, junction: int, arms: list[Arm]) -> bool:
         for lane in _ways(lanes, junction, list(arm.lanes)):
             origins[lane].add(number)
     for lane in origins:
-        ways = _ways(lanes, junction, [lane])
-        after = (after for way in (lane, *ways) for after in _successors(lanes, way))
-        exits[lane] = {
-            (int(lanes.road[other]), bool(lanes.lane_id[other] > 0))
-            for other in after
-            if lanes.junction[other] != junction
-        }
+        ways = (lane, *_ways(lanes, junction, [lane]))
+        exits[lane] = {road for way in ways for road in _roads_after(lanes, way)}
     return any(
         not origins[lane] & origins[other]
         and not exits[lane] & exits[other]
@@ -75,6 +74,51 @@ def roads_cross(lanes: Lanes, junction: int, arms: list[Arm]) -> bool:
         for other in (int(lanes.conflict_lane[row]),)
         if origins.get(other)
     )
+
+
+def _wide_roads_join(lanes: Lanes, junction: int, arms: list[Arm]) -> bool:
+    """Whether two arms of several lanes lead to one road, at an angle that no ramp has."""
+    wide = [arm for arm in arms if len(arm.lanes) > 1]
+    exits = [
+        {
+            road
+            for lane in _ways(lanes, junction, list(arm.lanes))
+            for road in _roads_after(lanes, lane)
+        }
+        for arm in wide
+    ]
+    return any(
+        abs(np.cos(a.end[3] - b.end[3])) < MERGE_COSINE and exits[i] & exits[j]
+        for i, a in enumerate(wide)
+        for j, b in enumerate(wide[:i])
+    )
+
+
+def _is_on_a_ring(lanes: Lanes, junction: int) -> bool:
+    """Whether one comes back to a junction within a roundabout's length."""
+    inside = np.flatnonzero((lanes.junction == junction) & (lanes.kind == LaneKind.DRIVING))
+    reached = {int(lane): 0.0 for lane in inside}
+    front = list(reached)
+    while front:
+        lane = front.pop()
+        for after in _successors(lanes, lane):
+            way = reached[lane] + float(lanes.length_m[lane])
+            if lanes.junction[after] == junction:
+                if reached[lane] > 0.0 and way < RING_M:
+                    return True
+            elif way < min(RING_M, reached.get(after, np.inf)):
+                reached[after] = way
+                front.append(after)
+    return False
+
+
+def _roads_after(lanes: Lanes, lane: int) -> set[Exit]:
+    """The roads outside a junction that follow on a lane in it."""
+    return {
+        (int(lanes.road[after]), bool(lanes.lane_id[after] > 0))
+        for after in _successors(lanes, lane)
+        if lanes.junction[after] != lanes.junction[lane]
+    }
 
 
 def _is_main(lanes: Lanes, arm: Arm) -> bool:

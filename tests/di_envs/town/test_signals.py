@@ -344,6 +344,43 @@ def test_a_guess_leaves_a_merge_alone(tmp_path):
     assert len(town.signals.kind) == 0
 
 
+@pytest.mark.parametrize(
+    ("heading", "lane_ids", "back", "heads"),
+    [
+        (1.57, (-1, -2), False, 2),  # two wide roads join at a right angle: one light each
+        (0.5, (-1, -2), False, 0),  # a ramp
+        (1.57, (-1,), False, 0),  # single lanes
+        (1.57, (-1, -2), True, 0),  # what goes out comes back in 150 m: a roundabout
+    ],
+)
+def test_a_guess_lights_wide_roads_that_join_at_an_angle(tmp_path, heading, lane_ids, back, heads):
+    def link(end, name, contact):
+        return f'<{end} elementType="road" elementId="{name}" contactPoint="{contact}"/>'
+
+    into = '<successor elementType="junction" elementId="5"/>'
+    plain = section(0.0, *map(lane, lane_ids))
+    through = section(0.0, *(lane(i, predecessor=i, successor=i) for i in lane_ids))
+    on = link("successor", "0", "start") if back else ""
+    parts = [
+        road("0", 50.0, plain, links=into),
+        road("1", 50.0, plain, links=into, x=60.0, y=-60.0, heading=heading),
+        road("9", 50.0, through if back else plain, links=on, x=70.0),
+    ]
+    connections = ""
+    for k, (x, y, turn) in enumerate(((50.0, 0.0, 0.0), (60.0, -10.0, 0.785))):
+        ends = link("predecessor", str(k), "end") + link("successor", "9", "start")
+        line = geometry(20.0, x=x, y=y, heading=turn)
+        parts.append(road(str(20 + k), 20.0, through, links=ends, line=line, junction="5"))
+        pairs = "".join(f'<laneLink from="{i}" to="{i}"/>' for i in lane_ids)
+        connections += (
+            f'<connection id="{k}" incomingRoad="{k}" connectingRoad="{20 + k}" '
+            f'contactPoint="start">{pairs}</connection>'
+        )
+    text = opendrive(*parts, f'<junction id="5">{connections}</junction>')
+    signals = load(text, tmp_path, signals="synthesise").signals
+    assert list(signals.kind) == [SignalKind.LIGHT] * heads
+
+
 def test_none_means_none_and_does_not_warn(tmp_path):
     assert len(load(crossing(), tmp_path, signals="none").signals.kind) == 0
 
