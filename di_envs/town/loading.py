@@ -7,8 +7,10 @@ import warnings
 from pathlib import Path
 
 from di_envs.town import cache
-from di_envs.town.lanes import Lanes
+from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.crosswalks import find_crosswalks
+from di_envs.town.reading.elements import decode_xml
+from di_envs.town.reading.guessing import guessed_heads
 from di_envs.town.reading.map_signals import heads_in_map
 from di_envs.town.reading.network import build_lanes, junction_names
 from di_envs.town.reading.opendrive import read_opendrive
@@ -16,7 +18,6 @@ from di_envs.town.reading.records import OpenDrive
 from di_envs.town.reading.sampling import LaneGeometry
 from di_envs.town.reading.sidecar import (
     enforced_limits,
-    guessed_heads,
     heads_of_sidecar,
     read_sidecar,
 )
@@ -46,7 +47,8 @@ def load_town(
         signals: Where signals come from. None: the map; a map that carries none gives a warning.
             "town05": the shipped sidecar for CARLA's own Town05, of any year. A file: a sidecar
             (`di_envs.town.reading.sidecar` has its format). "synthesise": a guess from the
-            junctions' shapes. "none": there are none.
+            junctions' shapes (`di_envs.town.reading.guessing`); a warning says what it made.
+            "none": there are none.
         cache_folder: Where parsed towns are kept; by default the user's cache folder.
 
     Raises:
@@ -59,21 +61,20 @@ def load_town(
     told = sidecar.read_bytes() if sidecar is not None else b""
     key = cache.content_hash(content, source.encode() + b"\0" + told)
     folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
-    # Undecodable bytes are the parser's to complain about.
-    text = content.decode("utf-8", errors="replace")
+    text = decode_xml(content, str(path))
     loaded = cache.load_cached(key, path.stem, text, folder)
     if loaded is None:
-        loaded = cache.freeze(_parse(path, content, text, source, sidecar, key))
+        loaded = cache.freeze(_parse(path, text, source, sidecar, key))
         cache.store(loaded, folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
+    if source == SYNTHESISE:
+        warnings.warn(_what_was_guessed(path, loaded), UserWarning, stacklevel=2)
     return loaded
 
 
-def _parse(
-    path: Path, content: bytes, text: str, source: str, sidecar: Path | None, key: str
-) -> Town:
-    document = read_opendrive(content, str(path))
+def _parse(path: Path, text: str, source: str, sidecar: Path | None, key: str) -> Town:
+    document = read_opendrive(text, str(path))
     lanes, geometry, stretches = build_lanes(document, str(path))
     names = junction_names(document)
     heads = _heads(document, lanes, stretches, geometry, source, sidecar)
@@ -138,4 +139,15 @@ def _no_signals_advice(path: Path) -> str:
         f"{path.name} carries no traffic signals, so nobody has to stop. Pass signals='town05' "
         "(for CARLA's own Town05), signals='synthesise' (a guess from the junctions' shapes), a "
         "sidecar file, or signals='none' to say that this is meant."
+    )
+
+
+def _what_was_guessed(path: Path, town: Town) -> str:
+    kinds, junctions = town.signals.kind, len(town.junction_names)
+    lit = int((town.signals.groups > 0).sum())
+    lights, stops = (int((kinds == kind).sum()) for kind in (SignalKind.LIGHT, SignalKind.STOP))
+    signed = len(set(town.signals.junction[kinds == SignalKind.STOP].tolist()))
+    return (
+        f"{path.name}: signals='synthesise' made {lights} lights at {lit} and {stops} stop signs "
+        f"at {signed} of the map's {junctions} junctions, guessed from their shapes."
     )

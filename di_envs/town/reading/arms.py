@@ -121,8 +121,12 @@ def stem_of(arms: list[Arm]) -> list[Arm]:
 
 
 def pole_place(lanes: Lanes, arm: Arm, ahead_m: float) -> tuple[float, float]:
-    """Where a signal's pole stands: (ahead, right) of the arm's end, beyond the road's edge [m]."""
-    last = arm.lanes[-1]
+    """Where a signal's pole stands: (ahead, right) of the arm's end, beyond the road's edge [m].
+
+    That is the right edge where one drives on the right, and the left one where on the left.
+    """
+    outward = 1.0 if _drives_on_the_right(lanes, arm.lanes[0]) else -1.0
+    last = arm.lanes[-1] if outward > 0.0 else arm.lanes[0]
     station = lanes.road_m[lanes.first[last] + lanes.count[last] - 1]
     edge = arm.half_width_m
     same_side = (
@@ -135,8 +139,15 @@ def pole_place(lanes: Lanes, arm: Arm, ahead_m: float) -> tuple[float, float]:
         nearest = int(np.argmin(np.abs(lanes.road_m[own] - station))) + lanes.first[lane]
         if abs(lanes.road_m[nearest] - station) < 1.0:
             _, right = arm.ahead_right(*lanes.points[nearest, :2])
-            edge = max(edge, right + 0.5 * float(lanes.width_m[nearest]))
-    return ahead_m, edge + _POLE_GAP_M
+            edge = max(edge, outward * right + 0.5 * float(lanes.width_m[nearest]))
+    return ahead_m, outward * (edge + _POLE_GAP_M)
+
+
+def _drives_on_the_right(lanes: Lanes, lane: int) -> bool:
+    """Whether lanes of negative ids run along growing stations of their road, as on the right."""
+    first = int(lanes.first[lane])
+    along = lanes.road_m[first + int(lanes.count[lane]) - 1] >= lanes.road_m[first]
+    return bool(along == (lanes.lane_id[lane] < 0))
 
 
 def _end_of(lanes: Lanes, lane: int) -> NDArray[np.float64]:

@@ -108,9 +108,7 @@ def _joints_of_connection(
     connecting = index_of.get(connection.connecting_road)
     if incoming is None or connecting is None:
         return
-    at_start = _incoming_end(
-        document.roads[incoming], document.roads[connecting], connection.at_start
-    )
+    at_start = _incoming_end(document.roads[incoming], document.roads[connecting], connection)
     a_section = _end_section(document.roads[incoming], at_start)
     b_section = _end_section(document.roads[connecting], connection.at_start)
     for origin, target in connection.lane_links:
@@ -122,17 +120,18 @@ def _joints_of_connection(
         )
 
 
-def _incoming_end(incoming: RoadRecord, connecting: RoadRecord, at_start: bool) -> bool:
+def _incoming_end(incoming: RoadRecord, connecting: RoadRecord, connection: Connection) -> bool:
     """Whether the incoming road meets the connecting one at its start.
 
     The connecting road's own link knows it; a road that begins and ends at the same junction has
-    no other way to tell.
+    no other way to tell. At a direct junction there is no connecting road, only the next one.
     """
-    link = connecting.predecessor if at_start else connecting.successor
-    if link is not None and not link.is_junction and link.element_id == incoming.road_id:
-        return link.at_start
+    if not connection.is_direct:
+        link = connecting.predecessor if connection.at_start else connecting.successor
+        if link is not None and not link.is_junction and link.element_id == incoming.road_id:
+            return link.at_start
     before = incoming.predecessor
-    return before is not None and before.is_junction and before.element_id == connecting.junction
+    return before is not None and before.is_junction and before.element_id == connection.junction
 
 
 def _end_section(road: RoadRecord, at_start: bool) -> int:

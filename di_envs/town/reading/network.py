@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.arrays import Float64, Int8, Int32
+from di_envs.numerics.arrays import Bool, Float64, Int8, Int32
 from di_envs.town.lanes import LaneKind, Lanes, Turn
 from di_envs.town.reading.conflicts import find_conflicts
 from di_envs.town.reading.links import as_ranges, find_successors, reversed_links
@@ -19,6 +19,7 @@ from di_envs.town.reading.stretches import Stretch, find_stretches
 DEFAULT_SPEED_MPS = 50.0 / 3.6  # where neither a lane, its road nor a neighbour along it says
 STRAIGHT_BELOW_RAD = np.deg2rad(35.0)  # CARLA's planner calls smaller changes of heading straight
 CELL_M = 4.0  # of the spatial index
+MOST_CELLS, HIGHEST_M = 25_000_000, 10_000.0  # of a town: 20 km by 20 km, and of mountains
 CHANGE_LEFT, CHANGE_RIGHT = 1, 2  # bits of Lanes.change
 
 
@@ -30,7 +31,7 @@ def build_lanes(document: OpenDrive, source: str) -> tuple[Lanes, LaneGeometry, 
         source: What to call the file in errors.
 
     Raises:
-        ValueError: If there is no lane to drive on.
+        ValueError: If there is no lane to drive on, or lanes are out of all proportion.
     """
     stretches = find_stretches(document)
     if not any(s.kind == LaneKind.DRIVING for s in stretches):
@@ -39,9 +40,35 @@ def build_lanes(document: OpenDrive, source: str) -> tuple[Lanes, LaneGeometry, 
             "of other kinds); a town needs lanes of type 'driving'."
         )
     geometry = LaneGeometry(document, stretches)
-    samples = sample_lanes(geometry, stretches)
+    try:
+        samples = sample_lanes(geometry, stretches)
+        _check_places(geometry, samples)
+    except ValueError as error:
+        raise ValueError(f"{source}: not readable as OpenDRIVE: {error}") from error
     successors = find_successors(document, stretches)
     return _assemble(document, stretches, geometry, samples, successors), geometry, stretches
+
+
+def _check_places(geometry: LaneGeometry, samples: Samples) -> None:
+    """Refuses a map that spreads over more ground than towns do: its grid would fill memory.
+
+    Raises:
+        ValueError: With the road that lies farthest from the middle of the others.
+    """
+    places = samples.points[:, :3]
+    finite: Bool = np.all(np.isfinite(samples.points), axis=1)
+    middle = np.median(places[finite], axis=0) if finite.any() else np.zeros(3)
+    away = np.where(finite[:, None], np.abs(places - middle), np.inf)
+    far = int(np.argmax(away.max(axis=1)))
+    spread = (places.max(axis=0) - places.min(axis=0)) / CELL_M
+    fits = finite.all() and max(spread[0], 1.0) * max(spread[1], 1.0) <= MOST_CELLS
+    if not (fits and spread[2] <= HIGHEST_M / CELL_M):
+        lane = int(np.searchsorted(np.cumsum(samples.counts), far, side="right"))
+        raise geometry.out_of_proportion(
+            lane,
+            f"it lies {np.hypot(*away[far, :2]):g} m aside of the middle of the map and "
+            f"{away[far, 2]:g} m above or below it, which no town holds",
+        )
 
 
 def _assemble(

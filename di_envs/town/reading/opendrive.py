@@ -1,18 +1,30 @@
 """Reads OpenDRIVE XML into records, in OpenDRIVE's own frame and stations: syntax, no geometry.
 
-Read is what CARLA's towns use of OpenDRIVE 1.4 to 1.8. Superelevation and lane heights are ignored,
-as CARLA ignores them when it places waypoints.
+Read is what CARLA's towns use of OpenDRIVE 1.4 to 1.8, and what others use to say the same: lanes
+by borders, banked roads, direct junctions. Lane heights and lateral shapes are ignored, as CARLA
+ignores them. What cannot be read rightly is refused by road and line of the file, not left out.
 """
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from di_envs.town.lanes import LaneKind
+from di_envs.town.reading.borders import NOTHING, summed
+from di_envs.town.reading.elements import (
+    LONGEST_M,
+    lane_number,
+    line_of,
+    named,
+    number,
+    parse_xml,
+    refused,
+    station,
+    unique,
+)
 from di_envs.town.reading.records import (
     GEOMETRY_SHAPES,
     Connection,
@@ -37,10 +49,15 @@ _LANE_KINDS = {
     "walking": LaneKind.SIDEWALK,
     "biking": LaneKind.BIKING,
 }
+_SIDES = ("left", "center", "right")
+_FASTEST = 1000.0  # of a speed limit, in its unit
+_SHARPEST = 100.0  # 1/m: a bend of a centimetre's radius
+_COVER_M, _COVER_SHARE = 1.0, 0.01  # that a plan view may be shorter than its road by
+_BORDERS_CROSS_M = 0.01  # that a border may lie within the one before it by
 _SPEED_UNITS_MPS = {None: 1.0, "m/s": 1.0, "mph": 0.44704, "km/h": 1.0 / 3.6}
 
 
-def read_opendrive(text: str | bytes, source: str) -> OpenDrive:
+def read_opendrive(text: str, source: str) -> OpenDrive:
     """Reads OpenDRIVE XML.
 
     Args:
@@ -50,31 +67,24 @@ def read_opendrive(text: str | bytes, source: str) -> OpenDrive:
     Raises:
         ValueError: If it is no XML, no OpenDRIVE, or carries no roads, or a value is not readable.
     """
-    root = _parse(text, source)
+    root = _root(text, source)
     try:
-        roads = tuple(_road(element) for element in root.iterfind("road"))
+        roads = unique(root.iterfind("road")).values()
+        junctions = unique(root.iterfind("junction"))
         return OpenDrive(
-            roads=roads,
-            junctions={e.get("id", ""): _connections(e) for e in root.iterfind("junction")},
+            roads=tuple(_road(element) for element in roads),
+            junctions={name: _connections(e) for name, e in junctions.items()},
             light_order=_light_order(root),
             geo_origin=_geo_origin(root),
         )
-    except (TypeError, ValueError, KeyError) as error:
+    except ValueError as error:
         raise ValueError(f"{source}: not readable as OpenDRIVE: {error}.") from error
 
 
-def _parse(text: str | bytes, source: str) -> Element:
+def _root(text: str, source: str) -> Element:
     if not text.strip():
         raise ValueError(f"{source} is empty; expected an OpenDRIVE file (.xodr).")
-    try:
-        root = ET.fromstring(text)
-    except ET.ParseError as error:
-        raise ValueError(
-            f"{source} is not well-formed XML ({error}); expected an OpenDRIVE file (.xodr)."
-        ) from error
-    if root.tag.startswith("{"):  # 1.8 files may declare a namespace
-        for element in root.iter():
-            element.tag = element.tag.rpartition("}")[2]
+    root = parse_xml(text, source)
     if root.tag != "OpenDRIVE":
         raise ValueError(
             f"{source} is XML but not OpenDRIVE: its root is <{root.tag}>, not <OpenDRIVE>."
@@ -82,21 +92,9 @@ def _parse(text: str | bytes, source: str) -> Element:
     return root
 
 
-def _number(element: Element, key: str, default: float | None = None) -> float:
-    value = element.get(key)
-    if value is None:
-        if default is None:
-            raise ValueError(f"<{element.tag}> has no attribute '{key}'")
-        return default
-    try:
-        return float(value)
-    except ValueError:
-        raise ValueError(f"<{element.tag} {key}='{value}'> is not a number") from None
-
-
 def _cubics(elements: Iterable[Element], key: str = "s", base: float = 0.0) -> Float64:
     rows = [
-        [base + _number(e, key, 0.0), *(_number(e, c, 0.0) for c in ("a", "b", "c", "d"))]
+        [base + station(e, key, 0.0), *(number(e, c, 0.0) for c in ("a", "b", "c", "d"))]
         for e in elements
     ]
     table = np.array(rows or [[base, 0.0, 0.0, 0.0, 0.0]])
@@ -104,38 +102,48 @@ def _cubics(elements: Iterable[Element], key: str = "s", base: float = 0.0) -> F
 
 
 def _speed(element: Element | None) -> float | None:
+    """A limit [m/s]; None where there is none, which some files write as 0."""
     if element is None or element.get("max") in (None, "no limit", "undefined"):
         return None
     unit = element.get("unit")
     if unit not in _SPEED_UNITS_MPS:
         known = ", ".join(u for u in _SPEED_UNITS_MPS if u)
-        raise ValueError(f"speed unit '{unit}' is unknown; known: {known}")
-    return _number(element, "max") * _SPEED_UNITS_MPS[unit]
+        raise refused(element, f"speed unit '{unit}' is unknown; known: {known}")
+    return number(element, "max", least=0.0, most=_FASTEST) * _SPEED_UNITS_MPS[unit] or None
 
 
 def _road(element: Element) -> RoadRecord:
-    road_id = element.get("id", "")
+    road_id = named(element)
     try:
-        length = _number(element, "length")
+        length = number(element, "length", least=0.0, most=LONGEST_M)
         junction = element.get("junction", "-1")
-        speeds = ((_number(e, "s", 0.0), _speed(e.find("speed"))) for e in element.iterfind("type"))
+        speeds = ((station(e, "s", 0.0), _speed(e.find("speed"))) for e in element.iterfind("type"))
         return RoadRecord(
             road_id=road_id,
+            line=line_of(element),
             length=length,
             junction=None if junction == "-1" else junction,
             right_hand=element.get("rule", "RHT") != "LHT",
             predecessor=_link(element.find("link/predecessor")),
             successor=_link(element.find("link/successor")),
             speeds=tuple(sorted((s, v) for s, v in speeds if v is not None)),
-            geometry=_geometry(element),
+            geometry=_geometry(element, length),
             elevation=_cubics(element.iterfind("elevationProfile/elevation")),
+            superelevation=_cubics(element.iterfind("lateralProfile/superelevation")),
+            crossfall=(_crossfall(element, "left"), _crossfall(element, "right")),
             lane_offset=_cubics(element.iterfind("lanes/laneOffset")),
             sections=_sections(element, length),
             signals=_signals(element),
             crosswalks=_crosswalks(element),
         )
     except ValueError as error:
-        raise ValueError(f"road '{road_id}': {error}") from error
+        raise ValueError(f"road '{road_id}', {error}") from error
+
+
+def _crossfall(road: Element, side: str) -> Float64:
+    """How a side of a road falls outwards [rad]; 1.4 and 1.5 have it."""
+    falls = road.iterfind("lateralProfile/crossfall")
+    return _cubics(e for e in falls if e.get("side", "both") in (side, "both"))
 
 
 def _link(element: Element | None) -> RoadLink | None:
@@ -144,19 +152,26 @@ def _link(element: Element | None) -> RoadLink | None:
     return RoadLink(
         is_junction=element.get("elementType") == "junction",
         element_id=element.get("elementId", ""),
-        at_start=element.get("contactPoint", "start") == "start",
+        at_start=_at_start(element),
     )
 
 
-def _geometry(road: Element) -> tuple[GeometryRecord, ...]:
+def _at_start(element: Element) -> bool:
+    contact = element.get("contactPoint", "start")
+    if contact not in ("start", "end"):
+        raise refused(element, f"contactPoint '{contact}' is unknown; known: start, end")
+    return contact == "start"
+
+
+def _geometry(road: Element, length: float) -> tuple[GeometryRecord, ...]:
     pieces = [
         GeometryRecord(
             shape=shape.tag,
-            begin=_number(e, "s"),
-            length=_number(e, "length"),
-            x=_number(e, "x"),
-            y=_number(e, "y"),
-            heading=_number(e, "hdg"),
+            begin=station(e, "s"),
+            length=number(e, "length", least=0.0, most=LONGEST_M),
+            x=number(e, "x"),
+            y=number(e, "y"),
+            heading=number(e, "hdg"),
             parameters=_shape_parameters(shape),
         )
         for e in road.iterfind("planView/geometry")
@@ -164,54 +179,118 @@ def _geometry(road: Element) -> tuple[GeometryRecord, ...]:
         if shape.tag in GEOMETRY_SHAPES
     ]
     if not pieces:
-        raise ValueError(f"no geometry of a known shape ({', '.join(GEOMETRY_SHAPES)})")
-    return tuple(sorted(pieces, key=lambda piece: piece.begin))
+        raise refused(road, f"no geometry of a known shape ({', '.join(GEOMETRY_SHAPES)})")
+    pieces.sort(key=lambda piece: piece.begin)
+    _check_cover(road, pieces, length)
+    return tuple(pieces)
+
+
+def _check_cover(road: Element, pieces: list[GeometryRecord], length: float) -> None:
+    """Refuses a plan view that leaves out a stretch of its road, where the road would stand still.
+
+    Raises:
+        ValueError: If it does by more than roundings do.
+    """
+    slack = max(_COVER_M, _COVER_SHARE * length)
+    covered = 0.0
+    for begin, end in (*((p.begin, p.begin + p.length) for p in pieces), (length, length)):
+        if begin > covered + slack:
+            raise refused(
+                road,
+                f"its planView says nothing of stations {covered:g} to {begin:g} of {length:g} m; "
+                "one of these lengths must be wrong",
+            )
+        covered = max(covered, end)
 
 
 def _shape_parameters(shape: Element) -> tuple[float, ...]:
     if shape.tag == "line":
         return ()
     if shape.tag == "arc":
-        return (_number(shape, "curvature"),)
+        return (_curvature(shape, "curvature"),)
     if shape.tag == "spiral":
-        return (_number(shape, "curvStart"), _number(shape, "curvEnd"))
+        return (_curvature(shape, "curvStart"), _curvature(shape, "curvEnd"))
     if shape.tag == "poly3":
-        return tuple(_number(shape, c, 0.0) for c in ("a", "b", "c", "d"))
+        return tuple(number(shape, c, 0.0) for c in ("a", "b", "c", "d"))
     names = [c + axis for axis in ("U", "V") for c in ("a", "b", "c", "d")]
     # The standard's default where pRange is absent is a parameter from 0 to 1.
     by_length = 1.0 if shape.get("pRange", "normalized") == "arcLength" else 0.0
-    return (*(_number(shape, name, 0.0) for name in names), by_length)
+    return (*(number(shape, name, 0.0) for name in names), by_length)
+
+
+def _curvature(shape: Element, key: str) -> float:
+    return number(shape, key, least=-_SHARPEST, most=_SHARPEST)
 
 
 def _sections(road: Element, length: float) -> tuple[SectionRecord, ...]:
-    elements = sorted(road.iterfind("lanes/laneSection"), key=lambda e: _number(e, "s", 0.0))
-    begins = [_number(e, "s", 0.0) for e in elements]
-    ends = [*begins[1:], max(length, begins[-1] if begins else 0.0)]
-    return tuple(
-        SectionRecord(
-            begin=begin,
-            end=end,
-            lanes={
-                lane.lane_id: lane
-                for side in ("left", "center", "right")
-                for lane in (_lane(e, begin) for e in element.iterfind(f"{side}/lane"))
-            },
+    elements = sorted(road.iterfind("lanes/laneSection"), key=lambda e: station(e, "s", 0.0))
+    if not elements:
+        raise refused(road, "it has no lane sections; a road needs one <laneSection> at least")
+    begins = [station(e, "s", 0.0) for e in elements]
+    if begins[-1] > length + _COVER_M:
+        raise refused(
+            elements[-1], f"<laneSection s='{begins[-1]:g}'> begins behind the road's {length:g} m"
         )
+    ends = [*begins[1:], max(length, begins[-1])]
+    shifted = bool(_cubics(road.iterfind("lanes/laneOffset"))[:, 1:].any())
+    return tuple(
+        SectionRecord(begin=begin, end=end, lanes=_lanes(element, begin, shifted))
         for element, begin, end in zip(elements, begins, ends, strict=True)
     )
 
 
-def _lane(element: Element, base: float) -> LaneRecord:
-    lane_id = int(element.get("id", "0"))
-    if element.find("border") is not None and element.find("width") is None:
-        raise ValueError(f"lane {lane_id} has <border>s; only <width> is read")
-    speeds = ((base + _number(e, "sOffset", 0.0), _speed(e)) for e in element.iterfind("speed"))
+def _lanes(section: Element, begin: float, shifted: bool) -> dict[int, LaneRecord]:
+    """The lanes of a section by id, from the left to the right of the file's sides."""
+    elements = unique(e for side in _SIDES for e in section.iterfind(f"{side}/lane"))
+    by_id = {lane_number(e, "id"): e for e in elements.values()}
+    if len(by_id) < len(elements):
+        raise refused(section, f"two of its lanes have one id: {', '.join(elements)}")
+    if shifted and any(_has_border(e) for e in by_id.values()):
+        raise refused(
+            section,
+            "its lanes have <border>s and its road a <laneOffset>: which of them moves a lane is "
+            "not defined; give <width>s",
+        )
+    widths = _widths(by_id, begin)
+    return {lane_id: _lane(e, lane_id, widths[lane_id], begin) for lane_id, e in by_id.items()}
+
+
+def _has_border(lane: Element) -> bool:
+    return lane.find("border") is not None and lane.find("width") is None
+
+
+def _widths(lanes: dict[int, Element], begin: float) -> dict[int, Float64]:
+    """Widths of a section's lanes, from the centre outwards: a border is told from the centre."""
+    widths = {}
+    edges = {1: NOTHING, -1: NOTHING}  # outwards of the reference line, of the lanes so far
+    for lane_id in sorted(lanes, key=abs):
+        element, side = lanes[lane_id], 1 if lane_id > 0 else -1
+        if lane_id and _has_border(element):
+            border = _cubics(element.iterfind("border"), "sOffset", begin)
+            border[:, 1:] *= side
+            widths[lane_id] = summed(border, edges[side], -1.0)
+            if widths[lane_id][:, 1].min() < -_BORDERS_CROSS_M:
+                raise refused(
+                    element,
+                    f"the <border> of lane {lane_id} lies on the inner side of the lane within it; "
+                    "borders are counted from the reference line, to the right negative",
+                )
+            edges[side] = border
+        else:
+            widths[lane_id] = _cubics(element.iterfind("width"), "sOffset", begin)
+            if lane_id:
+                edges[side] = summed(edges[side], widths[lane_id])
+    return widths
+
+
+def _lane(element: Element, lane_id: int, widths: Float64, base: float) -> LaneRecord:
+    speeds = ((base + station(e, "sOffset", 0.0), _speed(e)) for e in element.iterfind("speed"))
     return LaneRecord(
         lane_id=lane_id,
         kind=_LANE_KINDS.get(element.get("type", ""), LaneKind.OTHER),
-        widths=_cubics(element.iterfind("width"), "sOffset", base),
-        predecessors=tuple(int(e.get("id", "0")) for e in element.iterfind("link/predecessor")),
-        successors=tuple(int(e.get("id", "0")) for e in element.iterfind("link/successor")),
+        widths=widths,
+        predecessors=tuple(lane_number(e, "id") for e in element.iterfind("link/predecessor")),
+        successors=tuple(lane_number(e, "id") for e in element.iterfind("link/successor")),
         marks=tuple(_mark(e, base) for e in element.iterfind("roadMark")),
         speeds=tuple(sorted((s, v) for s, v in speeds if v is not None)),
     )
@@ -223,7 +302,7 @@ def _mark(element: Element, base: float) -> tuple[float, bool, bool]:
     if allowed is None:
         allowed = "both" if element.get("type", "none") in ("broken", "broken broken") else "none"
     up, down = allowed in ("both", "increase"), allowed in ("both", "decrease")
-    return base + _number(element, "sOffset", 0.0), up, down
+    return base + number(element, "sOffset", 0.0), up, down
 
 
 def _signals(road: Element) -> tuple[SignalRecord, ...]:
@@ -233,12 +312,12 @@ def _signals(road: Element) -> tuple[SignalRecord, ...]:
             is_reference=e.tag == "signalReference",
             type=e.get("type", ""),
             name=e.get("name", ""),
-            s=_number(e, "s", 0.0),
-            t=_number(e, "t", 0.0),
-            z_offset=_number(e, "zOffset", 0.0),
+            s=number(e, "s", 0.0),
+            t=number(e, "t", 0.0),
+            z_offset=number(e, "zOffset", 0.0),
             orientation=e.get("orientation", "none"),
             validity=tuple(
-                (int(v.get("fromLane", "0")), int(v.get("toLane", "0")))
+                (lane_number(v, "fromLane", 0), lane_number(v, "toLane", 0))
                 for v in e.iterfind("validity")
             ),
         )
@@ -257,14 +336,14 @@ def _crosswalks(road: Element) -> tuple[CrosswalkRecord, ...]:
         outline = e.find("outline") if outline is None else outline
         if outline is None:
             continue
-        local = [[_number(c, k, 0.0) for k in ("u", "v", "z")] for c in outline.iter("cornerLocal")]
-        along = [[_number(c, k, 0.0) for k in ("s", "t", "dz")] for c in outline.iter("cornerRoad")]
+        local = [[number(c, k, 0.0) for k in ("u", "v", "z")] for c in outline.iter("cornerLocal")]
+        along = [[number(c, k, 0.0) for k in ("s", "t", "dz")] for c in outline.iter("cornerRoad")]
         records.append(
             CrosswalkRecord(
-                s=_number(e, "s", 0.0),
-                t=_number(e, "t", 0.0),
-                heading=_number(e, "hdg", 0.0),
-                z_offset=_number(e, "zOffset", 0.0),
+                s=number(e, "s", 0.0),
+                t=number(e, "t", 0.0),
+                heading=number(e, "hdg", 0.0),
+                z_offset=number(e, "zOffset", 0.0),
                 corners=np.array(local or along, dtype=np.float64).reshape(-1, 3),
                 on_road=not local,
             )
@@ -273,24 +352,27 @@ def _crosswalks(road: Element) -> tuple[CrosswalkRecord, ...]:
 
 
 def _connections(junction: Element) -> tuple[Connection, ...]:
+    name, direct = named(junction), junction.get("type") == "direct"
     return tuple(
         Connection(
+            junction=name,
             incoming_road=e.get("incomingRoad", ""),
-            connecting_road=e.get("connectingRoad", ""),
-            at_start=e.get("contactPoint", "start") == "start",
+            connecting_road=e.get("linkedRoad" if direct else "connectingRoad", ""),
+            is_direct=direct,
+            at_start=_at_start(e),
             lane_links=tuple(
-                (int(k.get("from", "0")), int(k.get("to", "0"))) for k in e.iterfind("laneLink")
+                (lane_number(k, "from"), lane_number(k, "to")) for k in e.iterfind("laneLink")
             ),
         )
         for e in junction.iterfind("connection")
-        if e.get("connectingRoad") is not None
+        if e.get("linkedRoad" if direct else "connectingRoad") is not None
     )
 
 
 def _light_order(root: Element) -> dict[str, tuple[int, int]]:
     """Whose turn a signal has: its junction's sequence of controllers, then their place in it."""
     turns = {
-        controller.get("id"): (int(_number(controller, "sequence", 0.0)), place)
+        controller.get("id"): (int(number(controller, "sequence", 0.0)), place)
         for junction in root.iterfind("junction")
         for place, controller in enumerate(junction.iterfind("controller"))
     }
@@ -303,13 +385,15 @@ def _light_order(root: Element) -> dict[str, tuple[int, int]]:
 
 
 def _geo_origin(root: Element) -> tuple[float, float]:
-    text = root.findtext("header/geoReference") or ""
+    element = root.find("header/geoReference")
+    text = "" if element is None else (element.text or "")
     values = dict(part.lstrip("+").split("=", 1) for part in text.split() if "=" in part)
     try:
         latitude = float(values.get("lat_0", GEO_ORIGIN[0]))
         longitude = float(values.get("lon_0", GEO_ORIGIN[1]))
     except ValueError:
-        raise ValueError(
-            f"geoReference '{text.strip()}' has an unreadable lat_0 or lon_0"
-        ) from None
+        latitude = longitude = float("nan")
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
+        assert element is not None  # the default is readable
+        raise refused(element, f"geoReference '{text.strip()}' has an unreadable lat_0 or lon_0")
     return latitude, longitude

@@ -87,6 +87,7 @@ class RoadRecord:
     """A road; `junction` is None outside junctions."""
 
     road_id: str
+    line: int  # of the file, where it begins
     length: float
     junction: str | None
     right_hand: bool
@@ -95,6 +96,8 @@ class RoadRecord:
     speeds: tuple[tuple[float, float], ...]  # (station, m/s)
     geometry: tuple[GeometryRecord, ...]
     elevation: Float64  # (n, 5)
+    superelevation: Float64  # (n, 5) rad; positive: it falls to the right
+    crossfall: tuple[Float64, Float64]  # (n, 5) rad each: its left and right side fall outwards
     lane_offset: Float64  # (n, 5)
     sections: tuple[SectionRecord, ...]
     signals: tuple[SignalRecord, ...]
@@ -103,10 +106,12 @@ class RoadRecord:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Connection:
-    """A way through a junction."""
+    """A way through a junction, or straight into another road at a direct junction."""
 
+    junction: str
     incoming_road: str
     connecting_road: str
+    is_direct: bool
     at_start: bool  # it enters the connecting road at its start
     lane_links: tuple[tuple[int, int], ...]
 

@@ -16,6 +16,9 @@ from di_envs.town.reading.reference_line import Breakpoints, Cubics, ReferenceLi
 from di_envs.town.reading.stretches import Record, Stretch
 
 SPACING = 0.5  # m, the greatest between two points of a lane
+MOST_LANE_M = 5e6  # of all lanes together: ten million points
+# A lane round a corner may be longer than its reference line, but not by any factor.
+LONGER_THAN_ROAD, LONGER_M = 20.0, 500.0
 MINIMUM_LANE_LENGTH = 1e-3  # m; keeps spacings positive where a section has no length
 
 
@@ -44,6 +47,7 @@ class LaneGeometry:
                     self.records[road_index, number, lane_id] = len(lanes)
                     lanes.append(lane)
         self.lanes = lanes
+        self.roads = document.roads
         self._lane_ids = np.array([lane.lane_id for lane in lanes])
         self._road = np.array([s.road for s in stretches])
         self._side = np.sign([s.lane_id for s in stretches])
@@ -51,6 +55,13 @@ class LaneGeometry:
         self._line = ReferenceLines([road.geometry for road in document.roads])
         self._elevation = Cubics([road.elevation for road in document.roads])
         self._offset = Cubics([road.lane_offset for road in document.roads])
+        self._bank = Cubics([road.superelevation for road in document.roads])
+        self._falls = [Cubics([road.crossfall[k] for road in document.roads]) for k in (0, 1)]
+        self._banked = any(
+            table[:, 1:].any()
+            for road in document.roads
+            for table in (road.superelevation, *road.crossfall)
+        )
         self._width = Cubics([lane.widths for lane in lanes])
         self._find_records(document, stretches)
         self._find_marks()
@@ -76,6 +87,14 @@ class LaneGeometry:
         self._marks = Breakpoints([np.array([mark[0] for mark in table]) for table in tables])
         self._crossing = np.array([mark[1:] for table in tables for mark in table])  # up, down
 
+    def out_of_proportion(self, lane: int, why: str) -> ValueError:
+        """An error that names the road of a lane, and where the file has it."""
+        road = self.roads[int(self._road[lane])]
+        return ValueError(
+            f"road '{road.road_id}', line {road.line}: {why}; is one of its lengths, widths, "
+            "offsets or curves wrong?"
+        )
+
     def road_pose(self, road: Int64, station: Float64) -> tuple[Float64, Float64, Float64, Float64]:
         """(N,) x, y, z, heading of reference lines, in OpenDRIVE's frame."""
         x, y, heading, _ = self._line(road, station)
@@ -99,10 +118,24 @@ class LaneGeometry:
                 dt[here] += side[here] * grade
         x, y, heading, curvature = self._line(road, station)
         z, _ = self._elevation(road, station)
+        if self._banked:
+            z, t = self._lifted(road, station, z, t)
         # Inside of a bend tighter than the offset the lane would run backwards: keep the road's.
         ahead = np.maximum(1.0 - curvature * t, 1e-6)
         x, y = x - np.sin(heading) * t, y + np.cos(heading) * t
         return x, y, z, heading + np.arctan2(dt, ahead), width, record
+
+    def _lifted(
+        self, road: Int64, station: Float64, z: Float64, t: Float64
+    ) -> tuple[Float64, Float64]:
+        """(N,) heights and offsets on banked roads: turned about the reference line, and falling.
+
+        A positive superelevation lifts the left side, a positive crossfall lowers outer edges.
+        """
+        bank = self._bank(road, station)[0]
+        left, right = (fall(road, station)[0] for fall in self._falls)
+        fall = np.tan(np.where(t > 0.0, left, right))
+        return z + np.sin(bank) * t - fall * np.abs(t), np.cos(bank) * t
 
     def crossing(self, record: Int64, station: Float64) -> tuple[Bool, Bool]:
         """(N,) whether marks let one cross outwards and inwards of a lane."""
@@ -137,6 +170,7 @@ def _even_stations(
     geometry: LaneGeometry, begin: Float64, end: Float64, forward: Bool
 ) -> tuple[Int64, Float64]:
     """Stations whose lane-centre points are evenly spaced: first along the road, then along it."""
+    _check_lengths(geometry, end - begin, end - begin)
     lane, fraction = _grid(np.maximum(np.ceil((end - begin) / SPACING).astype(int) + 1, 2))
     station = begin[lane] + fraction * (end - begin)[lane]
     x, y = geometry.centre(lane, station)[:2]
@@ -146,10 +180,33 @@ def _even_stations(
     starts = np.searchsorted(lane, np.arange(len(begin)))
     ends = np.append(starts[1:], len(lane)) - 1
     length = arc[ends] - arc[starts]
+    _check_lengths(geometry, length, end - begin)
     lane, fraction = _grid(np.maximum(np.ceil(length / SPACING - 1e-9).astype(int) + 1, 2))
     fraction = np.where(forward[lane], fraction, 1.0 - fraction)
     even = np.interp(arc[starts[lane]] + fraction * length[lane], arc, station)
     return lane, np.clip(even, begin[lane], end[lane])
+
+
+def _check_lengths(geometry: LaneGeometry, length: Float64, along: Float64) -> None:
+    """Refuses lanes that no road has, before they ask for memory.
+
+    Args:
+        geometry: The lanes.
+        length: (L,) lengths [m].
+        along: (L,) those of their stretches of reference line.
+
+    Raises:
+        ValueError: With the road whose lane is the longest.
+    """
+    known = np.where(np.isfinite(length), length, np.inf)
+    longer = known > LONGER_THAN_ROAD * along + LONGER_M
+    if longer.any() or known.sum() > MOST_LANE_M:
+        worst = int(np.argmax(np.where(longer, known, 0.0) if longer.any() else known))
+        raise geometry.out_of_proportion(
+            worst,
+            f"a lane of it would measure {length[worst]:g} m over {along[worst]:g} m of road, all "
+            f"lanes together {known.sum():g} m (of {MOST_LANE_M:g} m at most)",
+        )
 
 
 def _grid(count: Int64) -> tuple[Int64, Float64]:

@@ -1,4 +1,4 @@
-"""Signals for maps that carry none: a sidecar file, or a guess from the shape of the junctions.
+"""Signals for maps that carry none, or other ones than theirs: a sidecar file.
 
 A sidecar is a JSON file:
 
@@ -42,8 +42,6 @@ KINDS = {
 SPEED_MATCH_KMH = 1.0
 MATCH_M = 12.0  # between a junction's centre and the one that a sidecar names
 ARM_MATCH_M = 12.0  # between an arm's stop line and the point that a sidecar names
-MANY_ARMS = 4  # junctions of so many arms get lights or all-way stops when guessing
-LANES_FOR_LIGHTS = 1.75  # approach lanes an arm, on average, from which a guess takes lights
 
 Kind = Literal["lights", "stop", "yield", "none"]
 
@@ -171,25 +169,6 @@ def heads_of_sidecar(
             arms[junction], _arm_kinds(chosen[junction], arms[junction], source)
         )
     ]
-
-
-def guessed_heads(lanes: Lanes, junctions: tuple[str, ...]) -> list[Head]:
-    """Lights at large crossings, all-way stops at small ones, a stop at the stem of a T.
-
-    Forks and merges, where no two arms look at each other, get nothing.
-    """
-    heads = []
-    for arms in junction_arms(lanes, len(junctions)):
-        stem = stem_of(arms)
-        if not stem:
-            continue
-        kind = SignalKind.STOP
-        if len(arms) >= MANY_ARMS:
-            stem = arms
-            if sum(len(arm.lanes) for arm in arms) >= LANES_FOR_LIGHTS * len(arms):
-                kind = SignalKind.LIGHT
-        heads += heads_of_arms(arms, [kind if arm in stem else None for arm in arms])
-    return heads
 
 
 def _match(

@@ -25,7 +25,7 @@ class Head:
     junction: int
     lanes: tuple[int, ...]  # approach lanes that it rules
     turn: tuple[int, ...] = ()  # lights of equal turn are green together; sorted by it
-    # x, y, z of the pole's foot; None: at the right edge of the road
+    # x, y, z of the pole's foot; None: at the outer edge of the road
     foot: tuple[float, float, float] | None = None
 
 
@@ -110,13 +110,14 @@ def _box(head: Head, arm: Arm, pose: NDArray[np.float64]) -> NDArray[np.float64]
     """The trigger box: the last metres of the approach lanes, before the stop line.
 
     Leaderboard 1.0 fines a stop sign only if the ego's centre had been in a box of the same size
-    around the sign's own place. So a sign's box is wide enough to cover, from there too, all its
-    lanes; it grows to the roadside, not over the oncoming lanes.
+    around the sign's own place. So a sign's box is centred as far aside as the sign stands and wide
+    enough to cover, from there too, all its lanes. What other lanes it covers does not matter: a
+    sign is for those on lanes that it rules (`di_envs.world.events.stop_sign`).
     """
     right, half_width = 0.0, arm.half_width_m
     if head.kind != SignalKind.LIGHT:
         _, pole = arm.ahead_right(pose[0], pose[1])
-        if 0.0 < pole <= SIGN_REACH_M:
-            half_width, right = pole + arm.half_width_m, pole
+        if abs(pole) <= SIGN_REACH_M:
+            half_width, right = abs(pole) + arm.half_width_m, pole
     middle = arm.place(-BOX_HALF_LENGTH_M, right)
     return np.append(middle, [BOX_HALF_LENGTH_M, half_width])

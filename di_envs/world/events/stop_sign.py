@@ -4,9 +4,10 @@ A sign is watched once its trigger box lies on the lane ahead. The fine comes wh
 longer ahead, the ego never stood, and its centre had been in a box of the same size around the
 *sign* (not around its trigger): a sign that stands far from its lane never fines.
 
-Boxes are parallel to the world's axes. Where a trigger box is turned, we take the box around it;
-CARLA's rule leaves its sides unturned, which is the same up to their order for streets along the
-axes.
+Two things are ours. A box is turned as its street is; CARLA's are parallel to the world's axes,
+which is the same for streets along them and otherwise reaches over other lanes. And a sign is for
+those whose lane it rules, or leads to one that it rules within the box: CARLA's boxes are drawn by
+hand so that they lie on no other lane, ours are not.
 """
 
 from __future__ import annotations
@@ -32,67 +33,72 @@ STOP, STOP_SIGN = int(SignalKind.STOP), int(EventKind.STOP_SIGN)
 
 
 @kernel
-def _box_extent(signals: Signals, sign: int) -> tuple[float, float]:
-    """Half sides along x and y [m] of the axis-parallel box around the trigger box."""
-    cos, sin = abs(math.cos(signals.box[sign, 3])), abs(math.sin(signals.box[sign, 3]))
-    half_length, half_width = signals.box[sign, 4], signals.box[sign, 5]
-    return half_length * cos + half_width * sin, half_length * sin + half_width * cos
+def _inside(x: float, y: float, z: float, centre: Float64, box: Float64) -> bool:
+    """Whether a point is in a box like a sign's trigger box, around another centre.
 
-
-@kernel
-def _inside(
-    x: float, y: float, z: float, centre: Float64, extent_x: float, extent_y: float
-) -> bool:
-    """Whether a point is in the box around `centre` (x, y, z, …), of these half sides [m]."""
-    beside = abs(x - centre[0]) < extent_x and abs(y - centre[1]) < extent_y
+    Args:
+        x, y, z: The point [m].
+        centre: (N,) x, y, z, … of the middle.
+        box: (6,) the trigger box, as of `Signals`, for its direction and half sides.
+    """
+    dx, dy = x - centre[0], y - centre[1]
+    cos, sin = math.cos(box[3]), math.sin(box[3])
+    ahead, right = cos * dx + sin * dy, cos * dy - sin * dx
+    beside = abs(ahead) < box[4] and abs(right) < box[5]
     return beside and abs(z - centre[2]) < SAME_LEVEL_M
 
 
 @kernel
-def _may_be_ahead(
-    now: EgoNow, pole: Float64, box: Float64, extent_x: float, extent_y: float
-) -> bool:
+def _may_be_ahead(now: EgoNow, pole: Float64, box: Float64) -> bool:
     """Necessary conditions for a sign's box to lie on the lane ahead, quick to check.
 
     Args:
         now: The ego now.
         pole: (4,) x, y, z, yaw of the sign's foot.
         box: (6,) its trigger box, as of `Signals`.
-        extent_x, extent_y: Half sides of the box around that one [m].
     """
     dx, dy, dz = pole[0] - now.x, pole[1] - now.y, pole[2] - now.z
     if dx * dx + dy * dy + dz * dz > NEAR_M * NEAR_M:
         return False
     # the lane's points start at most the look's width from the ego and reach 20 m
-    reach = STEPS_AHEAD * STEP_M + LANE_LOOK_M + extent_x + extent_y
+    reach = STEPS_AHEAD * STEP_M + LANE_LOOK_M + box[4] + box[5]
     return math.hypot(box[0] - now.x, box[1] - now.y) < reach
 
 
 @kernel
+def _rules_lane(lanes: Lanes, signals: Signals, lane: int, sign: int) -> bool:
+    """Whether the stop line at a lane's end is the sign's."""
+    line = lanes.stop_line[lane]
+    return line >= 0 and signals.stop_signal[line] == sign
+
+
+@kernel
 def is_ahead(lanes: Lanes, signals: Signals, now: EgoNow, sign: int) -> bool:
-    """Whether the ego, or one of the next 20 m of its lane, is in the sign's trigger box."""
-    extent_x, extent_y = _box_extent(signals, sign)
+    """Whether the ego is on its way through a sign's trigger box, over a lane that the sign rules.
+
+    Looked at are the ego and the next 20 m of its lane, first links onwards. The lane that the sign
+    rules may be shorter than the box or than a step: then the box begins on the lanes before it.
+    """
     box = signals.box[sign]
-    if not _may_be_ahead(now, signals.pose[sign], box, extent_x, extent_y):
+    if now.lane < 0 or not _may_be_ahead(now, signals.pose[sign], box):
         return False
-    if _inside(now.x, now.y, now.z, box, extent_x, extent_y):
-        return True
     lane, station = now.lane, now.lane_m
+    met = _inside(now.x, now.y, now.z, box, box)
+    ruled = _rules_lane(lanes, signals, lane, sign)
     for _ in range(STEPS_AHEAD):
-        if lane < 0:
-            return False
-        station += STEP_M
-        if station > lanes.length_m[lane]:
-            station -= lanes.length_m[lane]
-            link = lanes.successor_start[lane]
-            has_next = link < lanes.successor_start[lane + 1]
-            lane = lanes.successor[link] if has_next else -1
-            if lane < 0:
-                return False
-        x, y, z, _yaw = pose_at(lanes, lane, station)
-        if _inside(x, y, z, box, extent_x, extent_y):
+        if met and ruled:
             return True
-    return False
+        station += STEP_M
+        while station > lanes.length_m[lane]:
+            link = lanes.successor_start[lane]
+            if link == lanes.successor_start[lane + 1]:
+                return False
+            station -= lanes.length_m[lane]
+            lane = lanes.successor[link]
+            ruled = ruled or _rules_lane(lanes, signals, lane, sign)
+        x, y, z, _yaw = pose_at(lanes, lane, station)
+        met = met or _inside(x, y, z, box, box)
+    return met and ruled
 
 
 @kernel
@@ -131,8 +137,7 @@ def detect_stop_sign(
     if now.speed < STOOD_BELOW_MPS:
         state.stop_done[now.ego] = 1
     pole = signals.pose[sign]
-    extent_x, extent_y = _box_extent(signals, sign)
-    if _inside(now.x, now.y, now.z, pole, extent_x, extent_y):
+    if _inside(now.x, now.y, now.z, pole, signals.box[sign]):
         state.stop_affected[now.ego] = 1
     if is_ahead(lanes, signals, now, sign):
         return n

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 from di_envs.town.loading import load_town
@@ -88,16 +89,17 @@ def one_street(length: float = 100.0, **options: object) -> str:
     return opendrive(road("1", length, section(0.0, lane(1), lane(-1)), **options))  # type: ignore[arg-type]
 
 
-def crossing(lanes_each_way: int = 1, signals: str = "") -> str:
+def crossing(lanes_each_way: int = 1, signals: str = "", turned: float = 0.0) -> str:
     """Four streets of 80 m that end 10 m from the origin, joined straight on.
 
     Traffic into junction 9 runs on the streets' right lanes. Street 1 comes from the east, 2 from
-    the south (world y is positive there), 3 from the west, 4 from the north.
+    the south (world y is positive there), 3 from the west, 4 from the north; the whole of it
+    `turned` [rad] counter-clockwise.
     """
     ids = range(1, lanes_each_way + 1)
     streets, ways, connections = [], [], []
     headings = (3.141592653589793, 1.5707963267948966, 0.0, -1.5707963267948966)
-    for k, heading in enumerate(headings):
+    for k, heading in enumerate(unturned + turned for unturned in headings):
         x, y = -90.0 * math.cos(heading), -90.0 * math.sin(heading)
         street = section(0.0, *(lane(i) for i in ids), *(lane(-i) for i in ids))
         link = '<successor elementType="junction" elementId="9"/>'
@@ -121,3 +123,18 @@ def crossing(lanes_each_way: int = 1, signals: str = "") -> str:
         )
     junction = f'<junction id="9" name="crossing">{"".join(connections)}</junction>'
     return opendrive(*streets, *ways, junction)
+
+
+def left_handed(text: str) -> str:
+    """The same map seen in a mirror along its roads' lines: lane -1 is lane 1, driven on the left.
+
+    For maps of streets that run along their own lines, straight on through junctions.
+    """
+    swapped = re.sub(
+        r'(<lane id|<predecessor id|<successor id|from|to)="(-?[1-9][0-9]*)"',
+        lambda found: f'{found[1]}="{-int(found[2])}"',
+        text,
+    )
+    for old, new in (("left>", "x>"), ("right>", "left>"), ("x>", "right>"), ("RHT", "LHT")):
+        swapped = swapped.replace(old, new)
+    return swapped

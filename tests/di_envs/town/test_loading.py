@@ -37,7 +37,6 @@ def write(folder: Path, text: str) -> Path:
             one_street(before='<type s="0"><speed max="3" unit="kn"/></type>'),
             "unit 'kn' is unknown",
         ),
-        (one_street().replace("<width", "<border"), "only <width> is read"),
     ],
 )
 def test_a_file_that_is_no_town_says_what_is_wrong_and_where(tmp_path, text, message):

@@ -15,6 +15,7 @@ from tests.di_envs.town.small_maps import (
     crossing,
     geometry,
     lane,
+    left_handed,
     load,
     one_street,
     opendrive,
@@ -42,6 +43,23 @@ def refer(text, road_id, lanes):
     )
     head, tail = text.split(f'<road id="{road_id}"', 1)
     return head + f'<road id="{road_id}"' + tail.replace("</road>", reference, 1)
+
+
+def with_limit(text, kmh, *roads):
+    """A limit on all lanes of the roads of these ids; of all roads where none is named."""
+    limit = f'<type s="0"><speed max="{kmh}" unit="km/h"/></type><planView>'
+    parts = text.split("<road ")
+    return "<road ".join(
+        part.replace("<planView>", limit) if not roads or part[4:].split('"')[0] in roads else part
+        for part in parts
+    )
+
+
+def without_roads(text, *roads):
+    for name in roads:
+        head, tail = text.split(f'<road id="{name}"', 1)
+        text = head + tail.split("</road>", 1)[1]
+    return text
 
 
 def test_a_reference_inside_the_junction_rules_the_lanes_before_it(tmp_path):
@@ -174,6 +192,17 @@ def test_a_stop_signs_box_covers_its_lanes_from_the_sign_too(tmp_path):
         assert centre_line - half_width == pytest.approx(0.0, abs=1e-6)
 
 
+def test_where_one_drives_on_the_left_a_pole_stands_at_the_left(tmp_path):
+    path = sidecar(tmp_path, {"junction": "9", "kind": "stop"})
+    signals = load(left_handed(crossing(2)), tmp_path, signals=path).signals
+    # Traffic of street 1 runs west on its southern lanes; the kerb is at y = 7, on its left.
+    (east,) = np.flatnonzero(signals.pose[:, 0] > 10.0)
+    assert signals.pose[east, :3] == pytest.approx((12.0, 7.6, 0.0))
+    # Seen from the pole, 4.1 m beside the middle of two lanes of 7 m, the box covers both.
+    assert signals.box[east, :3] == pytest.approx((12.0, 7.6, 0.0))
+    assert signals.box[east, 4:] == pytest.approx((2.0, 4.1 + 3.5))
+
+
 def test_a_junction_is_found_by_its_centre_whatever_its_id(tmp_path):
     path = sidecar(tmp_path, {"junction": "another id", "centre": [1, -2], "kind": "stop"})
     assert len(load(crossing(), tmp_path, signals=path).signals.kind) == 4
@@ -233,10 +262,52 @@ def test_an_unknown_word_for_signals_is_refused_with_a_suggestion(tmp_path):
         load(crossing(), tmp_path, signals="synthesize")
 
 
-@pytest.mark.parametrize(("lanes_each_way", "kind"), [(1, SignalKind.STOP), (2, SignalKind.LIGHT)])
-def test_a_guess_gives_large_crossings_lights_and_small_ones_stops(tmp_path, lanes_each_way, kind):
-    signals = load(crossing(lanes_each_way), tmp_path, signals="synthesise").signals
-    assert list(signals.kind) == [kind] * 4
+@pytest.mark.parametrize(
+    ("lanes_each_way", "kmh", "kind"),
+    [
+        (1, 50, SignalKind.LIGHT),
+        (2, 50, SignalKind.LIGHT),
+        (2, 30, SignalKind.LIGHT),
+        (1, 30, SignalKind.STOP),  # nobody is on a main road: all stop
+    ],
+)
+def test_a_guess_gives_crossings_of_main_roads_lights_and_small_ones_stops(
+    tmp_path, lanes_each_way, kmh, kind
+):
+    text = with_limit(crossing(lanes_each_way), kmh)
+    assert list(load(text, tmp_path, signals="synthesise").signals.kind) == [kind] * 4
+
+
+def test_a_guess_stops_the_side_streets_that_cross_a_main_road(tmp_path):
+    text = with_limit(crossing(), 30, "2", "4")
+    town = load(text, tmp_path, signals="synthesise")
+    assert list(town.signals.kind) == [SignalKind.STOP] * 2
+    ruled = {town.road_names[i] for i in town.lanes.road[town.signals.stop_lane]}
+    assert ruled == {"2", "4"}
+
+
+def test_a_guess_gives_nothing_where_nobody_crosses_anybody(tmp_path):
+    """Two arms that look at each other and go straight on: a street, not a crossing."""
+    text = without_roads(crossing(), "2", "4", "12", "14")
+    assert len(load(text, tmp_path, signals="synthesise").signals.kind) == 0
+
+
+@pytest.mark.parametrize("name", ["Town01_2020", "Town04_2020"])
+def test_guessed_lights_stand_where_carlas_do_at_four_of_five_junctions(shared, tmp_path, name):
+    path = shared / "data" / "xodr" / f"{name}.xodr"
+    real, ours = (
+        load_town(path, signals, cache_folder=tmp_path).signals.groups > 0
+        for signals in (None, "synthesise")
+    )
+    print(f"{name}: lights or none as in the map at {(real == ours).mean():.1%} of {len(real)}")
+    assert (real == ours).mean() >= 0.8
+    assert ours.sum() >= real.sum() > 0
+
+
+def test_a_guess_says_what_it_made_also_from_the_cache(tmp_path):
+    for _ in range(2):
+        with pytest.warns(UserWarning, match=r"made 4 lights at 1 and 0 stop signs at 0 of .* 1 "):
+            load(crossing(), tmp_path, signals="synthesise")
 
 
 def test_a_guess_stops_the_stem_of_a_t(tmp_path):
@@ -271,6 +342,43 @@ def test_a_guess_leaves_a_merge_alone(tmp_path):
     town = load(text, tmp_path, signals="synthesise")
     assert np.count_nonzero(town.lanes.junction == 0) == 2
     assert len(town.signals.kind) == 0
+
+
+@pytest.mark.parametrize(
+    ("heading", "lane_ids", "back", "heads"),
+    [
+        (1.57, (-1, -2), False, 2),  # two wide roads join at a right angle: one light each
+        (0.5, (-1, -2), False, 0),  # a ramp
+        (1.57, (-1,), False, 0),  # single lanes
+        (1.57, (-1, -2), True, 0),  # what goes out comes back in 150 m: a roundabout
+    ],
+)
+def test_a_guess_lights_wide_roads_that_join_at_an_angle(tmp_path, heading, lane_ids, back, heads):
+    def link(end, name, contact):
+        return f'<{end} elementType="road" elementId="{name}" contactPoint="{contact}"/>'
+
+    into = '<successor elementType="junction" elementId="5"/>'
+    plain = section(0.0, *map(lane, lane_ids))
+    through = section(0.0, *(lane(i, predecessor=i, successor=i) for i in lane_ids))
+    on = link("successor", "0", "start") if back else ""
+    parts = [
+        road("0", 50.0, plain, links=into),
+        road("1", 50.0, plain, links=into, x=60.0, y=-60.0, heading=heading),
+        road("9", 50.0, through if back else plain, links=on, x=70.0),
+    ]
+    connections = ""
+    for k, (x, y, turn) in enumerate(((50.0, 0.0, 0.0), (60.0, -10.0, 0.785))):
+        ends = link("predecessor", str(k), "end") + link("successor", "9", "start")
+        line = geometry(20.0, x=x, y=y, heading=turn)
+        parts.append(road(str(20 + k), 20.0, through, links=ends, line=line, junction="5"))
+        pairs = "".join(f'<laneLink from="{i}" to="{i}"/>' for i in lane_ids)
+        connections += (
+            f'<connection id="{k}" incomingRoad="{k}" connectingRoad="{20 + k}" '
+            f'contactPoint="start">{pairs}</connection>'
+        )
+    text = opendrive(*parts, f'<junction id="5">{connections}</junction>')
+    signals = load(text, tmp_path, signals="synthesise").signals
+    assert list(signals.kind) == [SignalKind.LIGHT] * heads
 
 
 def test_none_means_none_and_does_not_warn(tmp_path):
