@@ -35,7 +35,7 @@ from di_envs.world.state import Capacity, EventKind, State, state_dtype, views_o
 from di_envs.world.step import Scenery, advance
 
 BATCH_TICKS = 100  # at most, in one call of the kernel: so its event rows suffice
-STATE_VERSION = "2"  # of the record's layout and meaning; a snapshot of another is refused
+STATE_VERSION = "3"  # of the record's layout and meaning; a snapshot of another is refused
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,9 +120,6 @@ class World:
         Args:
             seed: 0 to 2**64 - 1; equal seeds give equal episodes, bit for bit.
             plans: One route an ego; none for a world of traffic alone.
-
-        Raises:
-            ValueError: If the town has too few places for the traffic.
         """
         self._allocate(tuple(plans))
         begin_episode(self._state, seed, self._scenery, self.view.capacity, self.view.plans)

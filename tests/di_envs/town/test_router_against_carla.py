@@ -111,11 +111,7 @@ def test_the_oracle_plans_the_long_routes_as_carlas_own_file_did(shared: Path) -
         rows = oracle[f"long_{spec.route_id}"]
         rivals.planner.last, rivals.planner.leaving = RoadOption.VOID, -1
         stops = [carla.Location(*position) for position in spec.positions.tolist()]
-        route = [
-            step
-            for a, b in pairwise(stops)
-            for step in rivals.planner.plan(a, b)
-        ]
+        route = [step for a, b in pairwise(stops) for step in rivals.planner.plan(a, b)]
         assert [option.name for _, option in route] == [row[4] for row in rows]
         points = np.array([place(waypoint) for waypoint, _ in route])
         assert np.abs(points - [row[:3] for row in rows]).max() < 0.002
