@@ -55,8 +55,14 @@ def make_requests(actors: int) -> Requests:
 
 
 @kernel
-def find_entry(state: State, lanes: Lanes, actor: int, look_m: float) -> tuple[int, float]:
+def find_entry(
+    state: State, lanes: Lanes, actor: int, first: int, look_m: float
+) -> tuple[int, float]:
     """The next junction lane on a vehicle's path by which it comes into a junction.
+
+    Args:
+        first: Place in the path from which on to look.
+        look_m: How far before its front to look.
 
     Returns:
         (its place in the path, distance from the front to its line [m]), or (-1, NO_LEADER_M) if
@@ -68,8 +74,9 @@ def find_entry(state: State, lanes: Lanes, actor: int, look_m: float) -> tuple[i
         lane = state.path[actor, step]
         if lane < 0 or distance > look_m:
             break
-        if lanes.junction[lane] >= 0 and lanes.junction[lane] != lanes.junction[before]:
-            return step, distance
+        if step >= first and lanes.junction[lane] >= 0:
+            if lanes.junction[lane] != lanes.junction[before]:
+                return step, distance
         before = lane
         distance += lanes.length_m[lane]
     return -1, NO_LEADER_M

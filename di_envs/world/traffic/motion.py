@@ -174,7 +174,7 @@ def _indicator(state: State, lanes: Lanes, actor: int) -> int:
         return 1 if state.lateral_m[actor] < 0.0 else -1
     lane = state.lane[actor]
     if lanes.junction[lane] < 0:
-        step, _ = find_entry(state, lanes, actor, INDICATE_M)
+        step, _ = find_entry(state, lanes, actor, 1, INDICATE_M)
         if step > 0:
             lane = state.path[actor, step]
     turn = lanes.turn[lane]

@@ -34,7 +34,6 @@ from di_envs.world.traffic.yielding import (
     ego_in_the_way,
     exit_has_room,
     somebody_waits_between,
-    waits_for_grant,
     ways_conflict,
 )
 
@@ -98,7 +97,7 @@ def _move_grant_on(state: State, lanes: Lanes, actor: int) -> None:
             state.grant[actor] = lane
         return
     if state.grant_steps[actor] > 0:
-        step, _ = find_entry(state, lanes, actor, NO_LEADER_M)
+        step, _ = find_entry(state, lanes, actor, 1, NO_LEADER_M)
         if 0 < step <= state.grant_steps[actor]:
             state.grant[actor] = state.path[actor, step]
             return
@@ -157,7 +156,7 @@ def _ask_before(
     """Notes what a vehicle meets at the next junction on its path; whether it asks to enter."""
     speed = state.speed[actor]
     reach = 10.0 + 1.5 * speed + speed * speed / (2.0 * REQUEST_BRAKING_MPS2)
-    step, distance = find_entry(state, lanes, actor, reach)
+    step, distance = find_entry(state, lanes, actor, 1, reach)
     if step < 0:
         state.arrival_tick[actor] = -1
         return False
@@ -238,7 +237,8 @@ def _waits_behind(
         return True
     length = 2.0 * state.half_length[leader]
     before_line = ahead.gap_m[actor] + length < distance + OVER_LINE_M
-    return before_line and waits_for_grant(state, lanes, leader, WAITING_M)
+    step, _ = find_entry(state, lanes, leader, 1, WAITING_M)
+    return before_line and step > state.grant_steps[leader]
 
 
 @kernel

@@ -208,14 +208,20 @@ def somebody_waits_between(
                 if lanes.junction[lane] < 0:
                     return True
             elif other != actor and state.lane[other] == lane:
-                if waits_for_grant(state, lanes, other, NO_LEADER_M):
+                if _will_wait_on(state, lanes, other, actor, first, last):
                     return True
             body = occupancy.next[body]
     return False
 
 
 @kernel
-def waits_for_grant(state: State, lanes: Lanes, actor: int, look_m: float) -> bool:
-    """Whether the next junction on a vehicle's path is near and it has no grant for it."""
-    step, _ = find_entry(state, lanes, actor, look_m)
-    return step > state.grant_steps[actor]
+def _will_wait_on(
+    state: State, lanes: Lanes, other: int, actor: int, first: int, last: int
+) -> bool:
+    """Whether the lane up to which another vehicle may drive is one of these of the path."""
+    step, _ = find_entry(state, lanes, other, state.grant_steps[other] + 1, NO_LEADER_M)
+    if step > 0:
+        for k in range(first, last):
+            if state.path[actor, k] == state.path[other, step - 1]:
+                return True
+    return False

@@ -31,6 +31,7 @@ from di_envs.town.building.street_plan import (
 )
 
 OPEN = -1  # where a street leads out of the town
+_SPARE_M = 12.0  # of a junction's radius, beyond what its arms' widths need
 _FIRST_WAY = 100  # ids of the roads inside junctions start here
 _OUTER_DEG = (90, 135, 180, 225, 270)  # of arms that lead out, from the direction to a neighbour
 _FLAT = ((0.0, 0.0, 0.0, 0.0, 0.0),)
@@ -72,7 +73,7 @@ def small_map(seed: int) -> str:
 def _places(draw: random.Random) -> Iterator[_Place]:
     count, end = draw.choice((2, 2, 3)), 0.0
     lanes = draw.randint(1, 3)
-    radius = 12.0 + 1.5 * 2.0 * lanes * LANE_WIDTH_M
+    radius = _SPARE_M + 2.4 * lanes * LANE_WIDTH_M
     for k in range(count):
         inner = 0 < k < count - 1
         choices = (90, 270) if inner else _OUTER_DEG
@@ -92,7 +93,7 @@ def _places(draw: random.Random) -> Iterator[_Place]:
 def _streets(draw: random.Random, places: list[_Place], k: int) -> Iterator[Street]:
     """The streets that lead out of a junction, and the one to the next; noted as their arms."""
     place = places[k]
-    most = round((place.radius_m - 12.0) / (3.0 * LANE_WIDTH_M))
+    most = round((place.radius_m - _SPARE_M) / (2.4 * LANE_WIDTH_M))
     for number, direction in enumerate(place.outer):
         length = draw.uniform(30.0, 80.0)
         start = place.mouth(direction)

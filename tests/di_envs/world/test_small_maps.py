@@ -15,7 +15,7 @@ from di_envs.world.world import World, WorldConfig
 from tests.di_envs.world.small_maps import small_map
 from tests.di_envs.world.test_traffic_soak import overlapping_pair
 
-VEHICLES, MINUTES, LOOK_TICKS = 16, 10, 5
+VEHICLES, MINUTES, LOOK_TICKS = 10, 10, 5
 STANDS_S = 120.0
 
 
