@@ -273,7 +273,10 @@ def give_grants(
             continue
         if not _inner_lights_allow(state, lanes, signals, actor, first, last):
             continue
-        if _must_wait(requests, occupancy, state, lanes, signals, egos, actor, waiting):
+        if _meets_ego(requests, state, lanes, signals, egos, actor):
+            requests.shut[actor] = _AHEAD
+            continue
+        if _must_wait(requests, occupancy, state, lanes, actor, waiting):
             requests.queue[waiting] = actor
             waiting += 1
             continue
@@ -317,29 +320,31 @@ def _inner_lights_allow(
 
 
 @kernel
-def _must_wait(
-    requests: Requests,
-    occupancy: Occupancy,
-    state: State,
-    lanes: Lanes,
-    signals: Signals,
-    egos: int,
-    actor: int,
-    waiting: int,
+def _meets_ego(
+    requests: Requests, state: State, lanes: Lanes, signals: Signals, egos: int, actor: int
 ) -> bool:
-    """Whether others come first, on any of the junction lanes that a vehicle asks for."""
+    """Whether an ego is in a vehicle's way: then others may go first, for it may stand for ever."""
     after = requests.rank[actor] >= (as_int64(1) << 40)
     for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
         way = state.path[actor, step]
-        if lanes.junction[way] < 0:
-            continue
-        if ego_in_the_way(state, lanes, signals, egos, way, actor, after):
-            requests.shut[actor] = _AHEAD
-            return True
-        if _blocked_by_queue(requests, state, lanes, way, waiting) or crosses_claim(
-            occupancy, lanes, way, actor
-        ):
-            return True
+        if lanes.junction[way] >= 0:
+            if ego_in_the_way(state, lanes, signals, egos, way, actor, after):
+                return True
+    return False
+
+
+@kernel
+def _must_wait(
+    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int, waiting: int
+) -> bool:
+    """Whether others come first, on any of the junction lanes that a vehicle asks for."""
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+        way = state.path[actor, step]
+        if lanes.junction[way] >= 0:
+            if _blocked_by_queue(requests, state, lanes, way, waiting) or crosses_claim(
+                occupancy, lanes, way, actor
+            ):
+                return True
     return False
 
 
