@@ -23,6 +23,8 @@ from di_envs.world.traffic.approach import lane_behind
 from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.tables import TrafficTables
 
+ACROSS_COS = math.cos(math.radians(60.0))  # of the angle from which on one lies across a lane
+
 _ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
 
@@ -36,6 +38,7 @@ class Occupancy(NamedTuple):
     rear_m: NDArray[np.float64]  # (N,) lane stations
     front_m: NDArray[np.float64]  # (N,)
     speed: NDArray[np.float64]  # (N,) along the lane, not negative
+    across: NDArray[np.int8]  # (N,) 1 for a free body that lies across the lane
     size: NDArray[np.int32]  # (1,) bodies in use
     claim: NDArray[np.int32]  # (L,) first claim to a junction lane, or -1
     next_claim: NDArray[np.int32]  # (M,) the next one to the same lane, or -1
@@ -56,6 +59,7 @@ def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
         rear_m=np.zeros(bodies),
         front_m=np.zeros(bodies),
         speed=np.zeros(bodies),
+        across=np.zeros(bodies, np.int8),
         size=np.zeros(1, np.int32),
         claim=np.full(lanes, -1, np.int32),
         next_claim=np.full(claims, -1, np.int32),
@@ -77,6 +81,7 @@ def insert_body(
     occupancy.rear_m[body] = rear_m
     occupancy.front_m[body] = front_m
     occupancy.speed[body] = speed
+    occupancy.across[body] = 0
     behind = -1
     ahead = occupancy.first[lane]
     while ahead >= 0 and occupancy.rear_m[ahead] < rear_m:
@@ -171,6 +176,8 @@ def _insert_free_body(occupancy: Occupancy, state: State, lanes: Lanes, actor: i
         along = abs(math.cos(angle)) * half_length + abs(math.sin(angle)) * half_width
         speed = max(state.speed[actor] * math.cos(angle), 0.0)
         insert_body(occupancy, lane, actor, s - along, s + along, speed)
+        if math.cos(angle) < ACROSS_COS:
+            occupancy.across[occupancy.size[0] - 1] = 1
 
 
 @kernel
@@ -203,7 +210,10 @@ def body_behind(occupancy: Occupancy, lane: int, actor: int, s: float) -> int:
 def _nearest_sibling(
     occupancy: Occupancy, tables: TrafficTables, lane: int, actor: int, s: float, best_rear: float
 ) -> int:
-    """A body on a junction lane that forks from the same approach lane, where both overlap."""
+    """A body on a junction lane that forks from the same approach lane, where both overlap.
+
+    Who lies across that lane has not come by it: he counts only where he is on the own lane.
+    """
     found = -1
     for k in range(tables.sibling_start[lane], tables.sibling_start[lane + 1]):
         body = occupancy.first[tables.sibling_lane[k]]
@@ -215,6 +225,7 @@ def _nearest_sibling(
                 and middle > s
                 and rear < tables.sibling_end_m[k]
                 and rear < best_rear
+                and occupancy.across[body] == 0
             ):
                 best_rear = rear
                 found = body

@@ -33,6 +33,7 @@ from di_envs.world.traffic.yielding import (
     crosses_claim,
     ego_in_the_way,
     exit_has_room,
+    room_before_ego,
     somebody_waits_between,
     ways_conflict,
 )
@@ -76,7 +77,7 @@ def update_grants(
         asks = False
         if state.grant[actor] < 0 and lanes.junction[state.lane[actor]] >= 0:
             asks = _ask_inside(requests, state, lanes, ahead, egos, actor)
-        elif not _give_back_inside(state, lanes, ahead, egos, actor):
+        elif not _give_back_inside(requests, state, lanes, ahead, egos, actor):
             asks = _ask_before(requests, state, lanes, signals, ahead, actor, tick)
         if asks:
             _rank(requests, state, lanes, signals, actor, tick)
@@ -119,14 +120,27 @@ def _give_back(state: State, actor: int) -> None:
 
 
 @kernel
-def _give_back_inside(state: State, lanes: Lanes, ahead: Leaders, egos: int, actor: int) -> bool:
-    """Who stands in a junction behind an ego gives its grant back, or both would wait for ever."""
+def _give_back_inside(
+    requests: Requests, state: State, lanes: Lanes, ahead: Leaders, egos: int, actor: int
+) -> bool:
+    """Who stands in a junction for an ego gives its grant back, or both would wait for ever.
+
+    Notes too how far a vehicle with a grant may go for the sake of egos that are in its way.
+    """
+    if state.grant[actor] < 0:
+        return False
+    requests.line_m[actor] = room_before_ego(state, lanes, egos, actor)
     if lanes.junction[state.lane[actor]] < 0 or not _stands_with_grant(state, actor):
         return False
-    if not 0 <= ahead.actor[actor] < egos or ahead.gap_m[actor] > NEAR_EGO_M:
+    if requests.line_m[actor] > NEAR_EGO_M and not _is_behind_ego(ahead, egos, actor):
         return False
     _give_back(state, actor)
     return True
+
+
+@kernel
+def _is_behind_ego(ahead: Leaders, egos: int, actor: int) -> bool:
+    return 0 <= ahead.actor[actor] < egos and ahead.gap_m[actor] < NEAR_EGO_M
 
 
 @kernel
@@ -140,7 +154,7 @@ def _ask_inside(
     requests.way_end[actor] = run_end(state, lanes, actor, 0)
     if state.arrival_tick[actor] < 0:
         state.arrival_tick[actor] = state.tick[()]
-    return not (0 <= ahead.actor[actor] < egos and ahead.gap_m[actor] < NEAR_EGO_M)
+    return not _is_behind_ego(ahead, egos, actor)
 
 
 @kernel
@@ -167,7 +181,7 @@ def _ask_before(
     if step <= state.grant_steps[actor]:
         _keep_or_give_back(requests, state, lanes, signals, ahead, actor, step, distance)
         return False
-    requests.line_m[actor] = distance
+    requests.line_m[actor] = min(distance, requests.line_m[actor])
     requests.way[actor] = state.path[actor, step]
     if must_stop(state, lanes, signals, actor, approach):
         return False
@@ -194,7 +208,7 @@ def _keep_or_give_back(
     approach = state.path[actor, step - 1]
     if must_stop(state, lanes, signals, actor, approach):
         if can_stop(speed, distance, yellow_left_s(state, lanes, signals, approach)):
-            requests.line_m[actor] = distance
+            requests.line_m[actor] = min(distance, requests.line_m[actor])
             if not inside:
                 _give_back(state, actor)
             elif state.stopped_at[actor] != lanes.stop_line[approach]:
@@ -284,7 +298,7 @@ def give_grants(
             state.grant[actor] = requests.way[actor]
         state.grant_steps[actor] = last
         state.grant_tick[actor] = state.tick[()]
-        requests.line_m[actor] = NO_LEADER_M
+        requests.line_m[actor] = room_before_ego(state, lanes, egos, actor)
         claim_ahead(occupancy, state, lanes, actor, first, last)
 
 

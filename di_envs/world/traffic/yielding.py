@@ -6,7 +6,12 @@ from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import project_to_lane
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S, State
-from di_envs.world.traffic.approach import MOVING_MPS, find_entry, lane_before_junction
+from di_envs.world.traffic.approach import (
+    MOVING_MPS,
+    can_stop,
+    find_entry,
+    lane_before_junction,
+)
 from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.occupancy import Occupancy
 
@@ -74,7 +79,10 @@ def ego_in_the_way(
             if lane < 0:
                 break
             if lanes.junction[lane] >= 0:
-                if _ego_meets(state, lanes, way, lane, ego):
+                passed_m = -NO_LEADER_M
+                if state.lane[actor] == way:
+                    passed_m = state.lane_m[actor] + state.half_length[actor]
+                if _ego_meets(state, lanes, way, lane, ego, passed_m):
                     return True
             elif _ego_comes_first(
                 state, lanes, signals, way, lane, ego, actor, ranks_after_priority
@@ -84,15 +92,16 @@ def ego_in_the_way(
 
 
 @kernel
-def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int) -> bool:
+def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed_m: float) -> bool:
     """Whether an ego on a junction lane is before or in a place where `way` meets it.
 
     While it stands, only where it stands counts: others do not wait for who waits for them.
+    Places that end before station `passed_m` of the way do not count.
     """
     if lane == way:
         return False  # it is ahead on the same way: a leader, not a crossing
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
-        if lanes.conflict_lane[k] == lane:
+        if lanes.conflict_lane[k] == lane and lanes.conflict_end_m[k] > passed_m:
             s, _ = project_to_lane(lanes, lane, state.x[ego], state.y[ego])
             half = state.half_length[ego]
             stays = state.still_ticks[ego] > EGO_TURN_TICKS
@@ -137,6 +146,45 @@ def _ego_comes_first(
         if other != way and ways_conflict(lanes, way, other):
             return True
     return False
+
+
+@kernel
+def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
+    """From a vehicle's front to the first place ahead in its junctions that an ego is in [m].
+
+    Who stops there leaves the ego its way; who stopped at its side would stand in it. In junctions
+    that the vehicle has not come to yet, an ego that still drives up to the place comes first too.
+    Only places before which the vehicle can still stop count; NO_LEADER_M without one.
+    """
+    nearest = NO_LEADER_M
+    for ego in range(egos):
+        for j in range(OCCUPIED_LANES):
+            other = state.occupied[ego, j]
+            if other < 0:
+                break
+            if lanes.junction[other] < 0:
+                continue
+            s, _ = project_to_lane(lanes, other, state.x[ego], state.y[ego])
+            rear, front = s - state.half_length[ego], s + state.half_length[ego]
+            begin = -state.lane_m[actor] - state.half_length[actor]
+            for step in range(state.grant_steps[actor] + 1):
+                lane = state.path[actor, step]
+                for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
+                    room = begin + lanes.conflict_begin_m[k]
+                    if (
+                        lanes.conflict_lane[k] == other
+                        and room < nearest
+                        and rear < lanes.conflict_other_end_m[k]
+                        and (
+                            front > lanes.conflict_other_begin_m[k]
+                            or (step > 0 and state.still_ticks[ego] <= EGO_TURN_TICKS)
+                        )
+                        and can_stop(state.speed[actor], room, 0.0)
+                        and not _same_approach(lanes, lane, other)
+                    ):
+                        nearest = room
+                begin += lanes.length_m[lane]
+    return nearest
 
 
 @kernel
