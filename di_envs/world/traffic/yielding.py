@@ -95,7 +95,8 @@ def ego_in_the_way(
 def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed_m: float) -> bool:
     """Whether an ego on a junction lane is before or in a place where `way` meets it.
 
-    While it stands, only where it stands counts: others do not wait for who waits for them.
+    Once it has stood, it counts only on lanes on which it lies: others do not wait for who waits
+    for them, and drive past it where they can.
     Places that end before station `passed_m` of the way do not count.
     """
     if lane == way:
@@ -104,12 +105,21 @@ def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed
         if lanes.conflict_lane[k] == lane and lanes.conflict_end_m[k] > passed_m:
             s, _ = project_to_lane(lanes, lane, state.x[ego], state.y[ego])
             half = state.half_length[ego]
-            stays = state.still_ticks[ego] > EGO_TURN_TICKS
-            if s - half < lanes.conflict_other_end_m[k] and not (
-                stays and s + half < lanes.conflict_other_begin_m[k]
-            ):
+            if state.still_ticks[ego] > EGO_TURN_TICKS:
+                if not _lies_on(state, ego, way) or s + half < lanes.conflict_other_begin_m[k]:
+                    continue
+            if s - half < lanes.conflict_other_end_m[k]:
                 return True
     return False
+
+
+@kernel
+def _lies_on(state: State, ego: int, lane: int) -> bool:
+    """Whether an ego lies on a lane, or on so many that this may be one of them."""
+    for k in range(OCCUPIED_LANES):
+        if state.occupied[ego, k] == lane:
+            return True
+    return state.occupied[ego, OCCUPIED_LANES - 1] >= 0
 
 
 @kernel
@@ -169,16 +179,17 @@ def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
             begin = -state.lane_m[actor] - state.half_length[actor]
             for step in range(state.grant_steps[actor] + 1):
                 lane = state.path[actor, step]
+                stays = state.still_ticks[ego] > EGO_TURN_TICKS
+                if stays and not _lies_on(state, ego, lane):
+                    begin += lanes.length_m[lane]
+                    continue
                 for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
                     room = begin + lanes.conflict_begin_m[k]
                     if (
                         lanes.conflict_lane[k] == other
                         and room < nearest
                         and rear < lanes.conflict_other_end_m[k]
-                        and (
-                            front > lanes.conflict_other_begin_m[k]
-                            or (step > 0 and state.still_ticks[ego] <= EGO_TURN_TICKS)
-                        )
+                        and (front > lanes.conflict_other_begin_m[k] or (step > 0 and not stays))
                         and can_stop(state.speed[actor], room, 0.0)
                         and not _same_approach(lanes, lane, other)
                     ):

@@ -128,7 +128,7 @@ def with_ego(town: Town, seed: int, nose_m: float) -> World:
 
 @pytest.mark.filterwarnings("ignore:expected room for")
 @pytest.mark.parametrize("nose_m", [-1.0, 2.0])
-@pytest.mark.parametrize("seed", [0, 5, 8])
+@pytest.mark.parametrize("seed", [0, 6, 8])
 def test_an_ego_that_stands_for_ever_stops_only_those_whose_way_it_is_in(
     tmp_path: Path, seed: int, nose_m: float
 ) -> None:
