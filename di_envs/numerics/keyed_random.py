@@ -42,6 +42,7 @@ class Stream(IntEnum):
     SCENARIO = 18  # what a trigger brings: keyed by its number in its ego's plan, and the ego
     STEER_NOISE = 19
     THROTTLE_NOISE = 20
+    TRAFFIC_RETURN = 21  # where a vehicle that has left by an open end comes back
 
 
 @kernel

@@ -30,8 +30,8 @@ from di_envs.world.walkers.walk_graph import WalkGraph, build_walk_graph
 
 # Fields of which 0 would mean something: a fresh record gets -1 there, for none
 NONE_AT_FIRST = (
-    *("lane", "path", "previous_lane", "changing_from", "grant", "leaving", "stopped_at"),
-    *("arrival_tick", "walk_edge", "occupied"),
+    *("lane", "path", "previous_lane", "earlier_lanes", "changing_from", "grant"),
+    *("stopped_at", "arrival_tick", "walk_edge", "occupied"),
 )
 
 
@@ -128,9 +128,6 @@ def begin_episode(
         scenery: What the world stands on.
         capacity: How many there are of each.
         plans: One an ego.
-
-    Raises:
-        ValueError: If the town has too few places for the traffic.
     """
     state.seed[...] = seed
     for name in NONE_AT_FIRST:

@@ -80,11 +80,11 @@ def move_vehicle_to(
     state.lane[actor] = lane
     state.lane_m[actor] = station
     state.lateral_m[actor] = 0.0
-    for name in ("path", "previous_lane", "changing_from", "grant", "leaving"):
+    for name in ("path", "previous_lane", "earlier_lanes", "changing_from", "grant"):
         getattr(state, name)[actor] = -1
     for name in ("arrival_tick", "stopped_at"):
         getattr(state, name)[actor] = -1
-    state.still_ticks[actor] = 0
+    state.still_ticks[actor] = state.grant_steps[actor] = 0
     state.path[actor, 0] = lane
     choose_path(state, lanes, tables, actor, 1)
     place_vehicle(state, lanes, actor)
@@ -98,7 +98,8 @@ def move_vehicle_to(
 
 _VEHICLE_FIELDS = (
     *("x", "y", "z", "yaw", "lane", "lane_m", "lateral_m", "path", "previous_lane"),
-    *("changing_from", "grant", "leaving", "arrival_tick", "stopped_at", "still_ticks"),
+    *("earlier_lanes", "changing_from", "grant", "grant_steps", "arrival_tick", "stopped_at"),
+    "still_ticks",
 )
 
 

@@ -18,7 +18,8 @@ from di_envs.world.kinds import TICK_S as TICK_S
 from di_envs.world.kinds import ActorKind as ActorKind
 from di_envs.world.kinds import EventKind as EventKind
 
-PATH_LANES = 6  # lanes ahead that a vehicle has chosen, its own first
+PATH_LANES = 10  # lanes ahead that a vehicle has chosen, its own first
+TAIL_LANES = 6  # lanes remembered behind the one that a vehicle has left last
 SPEED_HISTORY = 4  # past speeds in an observation, at 0.5 s, 1 s, …
 HISTORY_TICKS = 10  # ticks between two of them
 HISTORY_LENGTH = SPEED_HISTORY * HISTORY_TICKS + 1
@@ -54,15 +55,17 @@ class State(NamedTuple):
     previous_lane: NDArray[
         np.int32
     ]  # the lane left last (its tail may still be on it), -1 for none
+    earlier_lanes: NDArray[np.int32]  # (A, TAIL_LANES) lanes left before that one, the last first
     changing_from: NDArray[np.int32]  # lane that a lane change leaves, -1 when none is under way
     change_start_tick: NDArray[np.int64]
     grant: NDArray[np.int32]  # junction lane that the vehicle may enter or is on, -1 for none
-    leaving: NDArray[np.int32]  # junction lane whose grant made way for the next one's, -1 for none
-    leaving_m: NDArray[np.float64]  # how far the centre is beyond the end of that lane
+    grant_steps: NDArray[np.int32]  # lanes of its path ahead, behind its own, that it may drive on
+    grant_tick: NDArray[np.int64]  # when that was last given
     arrival_tick: NDArray[np.int64]  # when it came to the stop line it waits at, -1 for none
     stopped_at: NDArray[np.int32]  # stop line at which it has stopped for the sign, -1 for none
     still_ticks: NDArray[np.int32]  # ticks for which it has stood still, or a walker got nowhere
     shock_ticks: NDArray[np.int32]  # ticks that one who was hit will still stand, 0 for none
+    away: NDArray[np.int8]  # ActorKind as which one comes back who left by an open end, 0 for none
     desired_factor: NDArray[np.float64]  # of the speed limit, per driver
     brake_light: NDArray[np.int8]
     indicator: NDArray[np.int8]  # -1 left, 0 off, 1 right
@@ -174,12 +177,14 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
         "lane": (_I4, actors),
         **dict.fromkeys(("lane_m", "lateral_m"), (_F8, actors)),
         "path": (_I4, (*actors, PATH_LANES)),
-        **dict.fromkeys(("previous_lane", "changing_from"), (_I4, actors)),
+        "previous_lane": (_I4, actors),
+        "earlier_lanes": (_I4, (*actors, TAIL_LANES)),
+        "changing_from": (_I4, actors),
         "change_start_tick": (_I8, actors),
-        **dict.fromkeys(("grant", "leaving"), (_I4, actors)),
-        "leaving_m": (_F8, actors),
-        "arrival_tick": (_I8, actors),
+        **dict.fromkeys(("grant", "grant_steps"), (_I4, actors)),
+        **dict.fromkeys(("grant_tick", "arrival_tick"), (_I8, actors)),
         **dict.fromkeys(("stopped_at", "still_ticks", "shock_ticks"), (_I4, actors)),
+        "away": (_I1, actors),
         "desired_factor": (_F8, actors),
         **dict.fromkeys(("brake_light", "indicator"), (_I1, actors)),
         "walk_edge": (_I4, actors),

@@ -24,6 +24,7 @@ from di_envs.world.traffic.approach import Requests, note_ego_arrival
 from di_envs.world.traffic.lane_change import change_lanes
 from di_envs.world.traffic.motion import move_vehicle, take_another_way
 from di_envs.world.traffic.occupancy import Occupancy, fill_occupancy
+from di_envs.world.traffic.returning import bring_back
 from di_envs.world.traffic.right_of_way import update_grants
 from di_envs.world.traffic.speed_choice import Leaders, choose_speed, find_leaders
 from di_envs.world.traffic.tables import TrafficTables
@@ -132,6 +133,7 @@ def _move_traffic(
     occupancy, requests, leaders = scratch.occupancy, scratch.requests, scratch.leaders
     mark_busy_crosswalks(state, scenery.walk, scratch.busy)
     fill_occupancy(occupancy, state, lanes, egos, vehicle_end)
+    bring_back(occupancy, state, lanes, tables, egos, vehicle_end)
     occupy_crossings(occupancy, state, scenery.scenarios, lanes, scratch.below)
     change_lanes(occupancy, state, lanes, tables, egos, vehicle_end)
     find_leaders(leaders, occupancy, state, lanes, tables, egos, vehicle_end)

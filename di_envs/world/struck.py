@@ -69,8 +69,10 @@ def take_away(state: State, actor: int) -> None:
     state.kind[actor] = ABSENT
     state.lane[actor] = -1
     state.grant[actor] = -1
-    state.leaving[actor] = -1
+    state.grant_steps[actor] = 0
+    state.away[actor] = 0
     state.previous_lane[actor] = -1
+    state.earlier_lanes[actor] = -1
     state.changing_from[actor] = -1
     state.walk_waiting[actor] = 0
     state.speed[actor] = 0.0

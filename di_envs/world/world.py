@@ -120,9 +120,6 @@ class World:
         Args:
             seed: 0 to 2**64 - 1; equal seeds give equal episodes, bit for bit.
             plans: One route an ego; none for a world of traffic alone.
-
-        Raises:
-            ValueError: If the town has too few places for the traffic.
         """
         self._allocate(tuple(plans))
         begin_episode(self._state, seed, self._scenery, self.view.capacity, self.view.plans)

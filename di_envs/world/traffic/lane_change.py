@@ -144,6 +144,7 @@ def _begin_change(
     state.lane_m[actor] = s
     state.lateral_m[actor] = lateral
     state.previous_lane[actor] = -1
+    state.earlier_lanes[actor] = -1
     state.path[actor, 0] = target
     choose_path(state, lanes, tables, actor, 1)
     insert_body(occupancy, target, actor, s - half, s + half, state.speed[actor])

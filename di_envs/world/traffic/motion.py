@@ -10,8 +10,8 @@ from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.town.lanes import Lanes
 from di_envs.town.queries import pose_at
-from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State
-from di_envs.world.traffic.approach import Requests
+from di_envs.world.state import PATH_LANES, TAIL_LANES, TICK_S, ActorKind, State
+from di_envs.world.traffic.approach import Requests, find_entry, lane_behind
 from di_envs.world.traffic.car_following import EMERGENCY_BRAKING_MPS2
 from di_envs.world.traffic.tables import TrafficTables
 
@@ -20,7 +20,7 @@ LATERAL_SPEED_MPS = 1.2  # of a lane change
 LATERAL_SHARE = 0.25  # of the forward speed, at most
 INDICATE_M = 30.0
 BRAKE_LIGHT_MPS2 = -0.8
-REROUTE_TICKS = round(20.0 / TICK_S)  # of standing still after which one leaves a full exit …
+REROUTE_TICKS = round(20.0 / TICK_S)  # of standing still after which one leaves a shut way …
 REROUTE_EVERY_TICKS = round(2.0 / TICK_S)  # … to others, if the next draw is another way
 
 _ABSENT = int(ActorKind.ABSENT)
@@ -67,15 +67,15 @@ def take_another_way(
     egos: int,
     vehicle_end: int,
 ) -> None:
-    """Who has long stood before a full exit draws a new path: so a ring of full streets dissolves.
+    """Who has long stood before a shut way draws a new path: so a ring of full streets dissolves.
 
     In such a ring everybody waits for room in the next street, and none of them for a mistake.
     """
     for actor in range(egos, vehicle_end):
         still = state.still_ticks[actor]
-        if requests.full[actor] and still >= REROUTE_TICKS and still % REROUTE_EVERY_TICKS == 0:
-            if requests.way_step[actor] == 1 and state.grant[actor] < 0:
-                choose_path(state, lanes, tables, actor, 1)
+        if requests.shut[actor] and still >= REROUTE_TICKS and still % REROUTE_EVERY_TICKS == 0:
+            if requests.way_step[actor] >= 1:
+                choose_path(state, lanes, tables, actor, requests.way_step[actor])
 
 
 @kernel
@@ -92,12 +92,12 @@ def move_vehicle(
     state.acceleration[actor] = (moved - speed) / TICK_S
     state.speed[actor] = moved
     state.lane_m[actor] += moved * TICK_S
-    if state.leaving[actor] >= 0:
-        state.leaving_m[actor] += moved * TICK_S
-        if state.leaving_m[actor] >= state.half_length[actor]:
-            state.leaving[actor] = -1
     state.still_ticks[actor] = state.still_ticks[actor] + 1 if moved < STILL_MPS else 0
-    _enter_next_lane(state, lanes, tables, actor)
+    while state.lane_m[actor] >= lanes.length_m[state.lane[actor]]:
+        if state.path[actor, 1] < 0:
+            leave_town(state, actor)
+            return
+        _enter_next_lane(state, lanes, tables, actor)
     _drift_to_centre(state, actor, moved)
     state.brake_light[actor] = 1 if state.acceleration[actor] < BRAKE_LIGHT_MPS2 else 0
     state.indicator[actor] = _indicator(state, lanes, actor)
@@ -109,20 +109,45 @@ def move_vehicle(
 
 
 @kernel
+def leave_town(state: State, actor: int) -> None:
+    """Takes a vehicle off the road at an open end; `returning` brings it back elsewhere."""
+    state.away[actor] = state.kind[actor]
+    state.kind[actor] = _ABSENT
+    state.speed[actor] = state.acceleration[actor] = state.yaw_rate[actor] = 0.0
+    forget_way(state, actor)
+    state.lane[actor] = -1
+
+
+@kernel
+def forget_way(state: State, actor: int) -> None:
+    """Clears where a vehicle came from, goes, and may go: what holds for who is newly set down."""
+    state.path[actor] = -1
+    state.previous_lane[actor] = state.changing_from[actor] = -1
+    state.earlier_lanes[actor] = -1
+    state.grant[actor] = -1
+    state.grant_steps[actor] = 0
+    state.arrival_tick[actor] = -1
+    state.stopped_at[actor] = -1
+    state.still_ticks[actor] = 0
+    state.lateral_m[actor] = 0.0
+    state.brake_light[actor] = state.indicator[actor] = 0
+
+
+@kernel
 def _enter_next_lane(state: State, lanes: Lanes, tables: TrafficTables, actor: int) -> None:
-    """Goes on to the path's next lane at the end of one; stops where there is none."""
-    lane = state.lane[actor]
-    if state.lane_m[actor] < lanes.length_m[lane]:
-        return
-    ahead = state.path[actor, 1]
-    if ahead < 0:
-        state.lane_m[actor] = lanes.length_m[lane]
-        state.speed[actor] = 0.0
-        return
+    """Goes on to the path's next lane at the end of one."""
+    lane, ahead = state.lane[actor], state.path[actor, 1]
     state.lane_m[actor] -= lanes.length_m[lane]
     state.lane[actor] = ahead
+    for step in range(TAIL_LANES - 1, 0, -1):
+        state.earlier_lanes[actor, step] = state.earlier_lanes[actor, step - 1]
+    state.earlier_lanes[actor, 0] = state.previous_lane[actor]
     state.previous_lane[actor] = lane
     state.changing_from[actor] = -1
+    if state.grant_steps[actor] > 0:
+        state.grant_steps[actor] -= 1
+    if lanes.junction[ahead] >= 0:
+        state.arrival_tick[actor] = state.stopped_at[actor] = -1
     for step in range(PATH_LANES - 1):
         state.path[actor, step] = state.path[actor, step + 1]
     choose_path(state, lanes, tables, actor, PATH_LANES - 1)
@@ -148,9 +173,10 @@ def _indicator(state: State, lanes: Lanes, actor: int) -> int:
     if state.lateral_m[actor] != 0.0:
         return 1 if state.lateral_m[actor] < 0.0 else -1
     lane = state.lane[actor]
-    if lanes.length_m[lane] - state.lane_m[actor] < INDICATE_M and state.path[actor, 1] >= 0:
-        if lanes.junction[lane] < 0:
-            lane = state.path[actor, 1]
+    if lanes.junction[lane] < 0:
+        step, _ = find_entry(state, lanes, actor, 1, INDICATE_M)
+        if step > 0:
+            lane = state.path[actor, step]
     turn = lanes.turn[lane]
     return -1 if turn == 1 else (1 if turn == 2 else 0)
 
@@ -182,9 +208,17 @@ def _point_on_path(
     """(x, y, z, yaw) of its lanes' centre `ahead_m` before a vehicle's middle, or behind it."""
     s = state.lane_m[actor] + ahead_m
     lane = state.lane[actor]
-    if s < 0.0 and state.previous_lane[actor] >= 0:
-        before = state.previous_lane[actor]
-        return pose_at(lanes, before, lanes.length_m[before] + s)
-    if s > lanes.length_m[lane] and state.path[actor, 1] >= 0:
-        return pose_at(lanes, state.path[actor, 1], s - lanes.length_m[lane])
+    step = 0
+    while s < 0.0 and step <= TAIL_LANES:
+        before = lane_behind(state, actor, step)
+        if before < 0:
+            return pose_at(lanes, lane, s)
+        lane = before
+        s += lanes.length_m[lane]
+        step += 1
+    step = 1
+    while s > lanes.length_m[lane] and step < PATH_LANES and state.path[actor, step] >= 0:
+        s -= lanes.length_m[lane]
+        lane = state.path[actor, step]
+        step += 1
     return pose_at(lanes, lane, s)

@@ -1,7 +1,8 @@
 """Who is where on the lanes: per tick, each lane's bodies in order, and the search for a leader.
 
-A body lies on every lane that it overlaps: its own, the one its tail has not left, the one a lane
-change leaves, and for a free body (an ego) each lane below its box.
+A body lies on every lane that it overlaps: its own, those that its tail has not left, the one a
+lane change leaves, and for a free body (an ego) each lane below its box. Lanes inside junctions
+have claims besides: of those who are on them, and of those who have the grant to come.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes
 from di_envs.town.queries import project_to_lane
-from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, ActorKind, State
+from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TAIL_LANES, ActorKind, State
+from di_envs.world.traffic.approach import lane_behind
 from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.tables import TrafficTables
+
+ACROSS_COS = math.cos(math.radians(60.0))  # of the angle from which on one lies across a lane
 
 _ABSENT, _WALKER = int(ActorKind.ABSENT), int(ActorKind.WALKER)
 
@@ -34,16 +38,20 @@ class Occupancy(NamedTuple):
     rear_m: NDArray[np.float64]  # (N,) lane stations
     front_m: NDArray[np.float64]  # (N,)
     speed: NDArray[np.float64]  # (N,) along the lane, not negative
+    across: NDArray[np.int8]  # (N,) 1 for a free body that lies across the lane
     size: NDArray[np.int32]  # (1,) bodies in use
-    holder: NDArray[np.int32]  # (L,) first vehicle that holds the grant for a junction lane, or -1
-    next_holder: NDArray[np.int32]  # (A,)
-    leaver: NDArray[np.int32]  # (L,) first vehicle that is leaving a junction lane, or -1
-    next_leaver: NDArray[np.int32]  # (A,)
+    claim: NDArray[np.int32]  # (L,) first claim to a junction lane, or -1
+    next_claim: NDArray[np.int32]  # (M,) the next one to the same lane, or -1
+    claimant: NDArray[np.int32]  # (M,) the vehicle
+    claim_rear_m: NDArray[np.float64]  # (M,) station of its rear, negative before the lane
+    claim_front_m: NDArray[np.float64]  # (M,) how far it may go, NO_LEADER_M for all the way
+    claims: NDArray[np.int32]  # (1,) claims in use
 
 
 def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
     """Allocates the scratch for `lanes` lanes and `actors` actors, `egos` of them free bodies."""
-    bodies = 4 * actors + OCCUPIED_LANES * egos
+    bodies = (TAIL_LANES + 4) * actors + OCCUPIED_LANES * egos
+    claims = (TAIL_LANES + 2 * PATH_LANES + 1) * actors
     return Occupancy(
         first=np.full(lanes, -1, np.int32),
         next=np.full(bodies, -1, np.int32),
@@ -51,11 +59,14 @@ def make_occupancy(lanes: int, actors: int, egos: int) -> Occupancy:
         rear_m=np.zeros(bodies),
         front_m=np.zeros(bodies),
         speed=np.zeros(bodies),
+        across=np.zeros(bodies, np.int8),
         size=np.zeros(1, np.int32),
-        holder=np.full(lanes, -1, np.int32),
-        next_holder=np.full(actors, -1, np.int32),
-        leaver=np.full(lanes, -1, np.int32),
-        next_leaver=np.full(actors, -1, np.int32),
+        claim=np.full(lanes, -1, np.int32),
+        next_claim=np.full(claims, -1, np.int32),
+        claimant=np.full(claims, -1, np.int32),
+        claim_rear_m=np.zeros(claims),
+        claim_front_m=np.zeros(claims),
+        claims=np.zeros(1, np.int32),
     )
 
 
@@ -70,6 +81,7 @@ def insert_body(
     occupancy.rear_m[body] = rear_m
     occupancy.front_m[body] = front_m
     occupancy.speed[body] = speed
+    occupancy.across[body] = 0
     behind = -1
     ahead = occupancy.first[lane]
     while ahead >= 0 and occupancy.rear_m[ahead] < rear_m:
@@ -88,22 +100,15 @@ def fill_occupancy(
 ) -> None:
     """Rebuilds all lists from the state: egos [0, egos), vehicles [egos, vehicle_end)."""
     occupancy.first[:] = -1
-    occupancy.holder[:] = -1
-    occupancy.leaver[:] = -1
-    occupancy.size[0] = 0
+    occupancy.claim[:] = -1
+    occupancy.size[0] = occupancy.claims[0] = 0
     for ego in range(egos):
         _insert_free_body(occupancy, state, lanes, ego)
     for actor in range(egos, vehicle_end):
         if state.kind[actor] != _ABSENT and state.lane[actor] >= 0:
             insert_vehicle(occupancy, state, lanes, actor)
-            grant = state.grant[actor]
-            if grant >= 0:
-                occupancy.next_holder[actor] = occupancy.holder[grant]
-                occupancy.holder[grant] = actor
-            leaving = state.leaving[actor]
-            if leaving >= 0:
-                occupancy.next_leaver[actor] = occupancy.leaver[leaving]
-                occupancy.leaver[leaving] = actor
+            if state.grant_steps[actor] > 0:
+                claim_ahead(occupancy, state, lanes, actor, 1, state.grant_steps[actor])
 
 
 @kernel
@@ -112,14 +117,47 @@ def insert_vehicle(occupancy: Occupancy, state: State, lanes: Lanes, actor: int)
     lane = state.lane[actor]
     s, half, speed = state.lane_m[actor], state.half_length[actor], state.speed[actor]
     insert_body(occupancy, lane, actor, s - half, s + half, speed)
-    before = state.previous_lane[actor]
-    if before >= 0 and s < half:
-        length = lanes.length_m[before]
-        insert_body(occupancy, before, actor, length + s - half, length + s + half, speed)
+    if lanes.junction[lane] >= 0:
+        reach = NO_LEADER_M if state.grant[actor] >= 0 else s + half
+        _add_claim(occupancy, lane, actor, s - half, reach)
     beside = state.changing_from[actor]
     if beside >= 0:
-        s *= lanes.length_m[beside] / lanes.length_m[lane]
-        insert_body(occupancy, beside, actor, s - half, s + half, speed)
+        along = s * lanes.length_m[beside] / lanes.length_m[lane]
+        insert_body(occupancy, beside, actor, along - half, along + half, speed)
+    for step in range(TAIL_LANES + 1):
+        before = lane_behind(state, actor, step)
+        if before < 0 or s >= half:
+            break
+        s += lanes.length_m[before]
+        insert_body(occupancy, before, actor, s - half, s + half, speed)
+        if lanes.junction[before] >= 0:
+            _add_claim(occupancy, before, actor, s - half, NO_LEADER_M)
+
+
+@kernel
+def claim_ahead(
+    occupancy: Occupancy, state: State, lanes: Lanes, actor: int, first: int, last: int
+) -> None:
+    """Claims the junction lanes of a vehicle's path from place `first` to `last`."""
+    begin = -state.lane_m[actor]
+    for step in range(last + 1):
+        lane = state.path[actor, step]
+        if step >= first and lanes.junction[lane] >= 0:
+            rear = -begin - state.half_length[actor]
+            _add_claim(occupancy, lane, actor, rear, NO_LEADER_M)
+        begin += lanes.length_m[lane]
+
+
+@kernel
+def _add_claim(occupancy: Occupancy, lane: int, actor: int, rear_m: float, front_m: float) -> None:
+    """Adds a claim to a lane's list."""
+    row = occupancy.claims[0]
+    occupancy.claims[0] = row + 1
+    occupancy.claimant[row] = actor
+    occupancy.claim_rear_m[row] = rear_m
+    occupancy.claim_front_m[row] = front_m
+    occupancy.next_claim[row] = occupancy.claim[lane]
+    occupancy.claim[lane] = row
 
 
 @kernel
@@ -138,6 +176,8 @@ def _insert_free_body(occupancy: Occupancy, state: State, lanes: Lanes, actor: i
         along = abs(math.cos(angle)) * half_length + abs(math.sin(angle)) * half_width
         speed = max(state.speed[actor] * math.cos(angle), 0.0)
         insert_body(occupancy, lane, actor, s - along, s + along, speed)
+        if math.cos(angle) < ACROSS_COS:
+            occupancy.across[occupancy.size[0] - 1] = 1
 
 
 @kernel
@@ -170,7 +210,10 @@ def body_behind(occupancy: Occupancy, lane: int, actor: int, s: float) -> int:
 def _nearest_sibling(
     occupancy: Occupancy, tables: TrafficTables, lane: int, actor: int, s: float, best_rear: float
 ) -> int:
-    """A body on a junction lane that forks from the same approach lane, where both overlap."""
+    """A body on a junction lane that forks from the same approach lane, where both overlap.
+
+    Who lies across that lane has not come by it: he counts only where he is on the own lane.
+    """
     found = -1
     for k in range(tables.sibling_start[lane], tables.sibling_start[lane + 1]):
         body = occupancy.first[tables.sibling_lane[k]]
@@ -182,6 +225,7 @@ def _nearest_sibling(
                 and middle > s
                 and rear < tables.sibling_end_m[k]
                 and rear < best_rear
+                and occupancy.across[body] == 0
             ):
                 best_rear = rear
                 found = body

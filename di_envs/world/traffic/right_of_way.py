@@ -1,39 +1,52 @@
 """Who may enter a junction: a vehicle goes in only with a grant for its way through.
 
-A grant is given when the light is green or the stop has been made, when nobody who holds a grant
-for a crossing way, and no ego, is in the way, and when the exit has room, so that nobody ever
-stands in a junction and no gridlock forms. Those who have priority are served first, then those
-who arrived first; a vehicle that waits its turn keeps later ones from overtaking it.
+A grant is given when the light is green or the stop has been made, when nobody who has a claim to
+a crossing way, and no ego, is in the way, and when the exit has room, so that nobody ever stands
+in a junction and no gridlock forms. Where the next junction follows so closely that one could not
+wait before it, both are granted at once. Those who have priority are served first, then those who
+arrived first, then those with the lower id; a vehicle that waits its turn keeps later ones from
+overtaking it. Who cannot use its grant gives it back, so that nobody waits for who waits for him.
 """
 
 from __future__ import annotations
 
 from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
-from di_envs.town.lanes import Lanes, Signals
-from di_envs.world.state import PATH_LANES, ActorKind, State
+from di_envs.town.lanes import Lanes, SignalKind, Signals
+from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State
 from di_envs.world.traffic.approach import (
+    PATIENCE_TICKS,
     Requests,
     can_stop,
-    find_approach,
+    find_entry,
+    is_over_junction,
     must_stop,
     note_stop,
     priority_of,
+    run_end,
     yellow_left_s,
 )
-from di_envs.world.traffic.occupancy import Occupancy
+from di_envs.world.traffic.car_following import NO_LEADER_M
+from di_envs.world.traffic.occupancy import Occupancy, claim_ahead
 from di_envs.world.traffic.speed_choice import Leaders
 from di_envs.world.traffic.yielding import (
-    crosses_holder,
+    crosses_claim,
     ego_in_the_way,
     exit_has_room,
+    room_before_ego,
+    somebody_waits_between,
     ways_conflict,
 )
 
 REQUEST_BRAKING_MPS2 = 2.0  # a grant is asked for while one could still brake this gently
-STANDING_ROOM_M = 2.0  # between two junctions, beyond a vehicle's length, for it to wait there
+GIVE_BACK_TICKS = round(5.0 / TICK_S)  # of standing still with a grant, then others have a turn
+WAITING_M = 30.0  # before a junction, where one counts as waiting for it
+OVER_LINE_M = 1.0  # as far as somebody may stand beyond the line at which he waits
+NEAR_EGO_M = 8.0  # who stands this close behind an ego stands because of it
 
+_EXIT, _AHEAD = 1, 2  # what shuts a way: no room behind it, or somebody on it
 _ABSENT = int(ActorKind.ABSENT)
+_LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
@@ -53,87 +66,193 @@ def update_grants(
         ahead: The vehicles' leaders of this tick.
     """
     tick = int(state.tick[()])
-    requests.full[:] = 0
+    requests.shut[:] = 0
     asking = 0
     for actor in range(egos, vehicle_end):
+        requests.way[actor] = -1
+        requests.line_m[actor] = NO_LEADER_M
         if state.kind[actor] == _ABSENT:
             continue
-        _make_way_for_next(state, lanes, actor)
-        held = state.grant[actor]
-        _release_grant(state, lanes, actor)
-        speed = state.speed[actor]
-        reach = 10.0 + 1.5 * speed + speed * speed / (2.0 * REQUEST_BRAKING_MPS2)
-        find_approach(requests, state, lanes, actor, reach)
-        way = requests.way[actor]
-        if way < 0:
-            state.arrival_tick[actor] = -1
-            continue
-        distance = requests.distance_m[actor]
-        approach = state.path[actor, requests.way_step[actor] - 1]
-        note_stop(state, lanes, signals, actor, approach, distance, tick)
-        if must_stop(state, lanes, signals, actor, approach):
-            left_s = yellow_left_s(state, lanes, signals, approach)
-            if state.grant[actor] == way and can_stop(speed, distance, left_s):
-                state.grant[actor] = -1
-            continue
-        # who has just given up a grant asks from the next tick on: it is still in a holders' list
-        if held >= 0 or _waits_behind(state, ahead, actor, distance):
-            continue
-        waited = tick - state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else 0
-        priority = priority_of(state, lanes, signals, approach, way, waited)
-        arrival = state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else tick
-        requests.rank[actor] = (as_int64(priority) << 40) + as_int64(arrival)
-        requests.queue[asking] = actor
-        asking += 1
+        _move_grant_on(state, lanes, actor)
+        asks = False
+        if state.grant[actor] < 0 and lanes.junction[state.lane[actor]] >= 0:
+            asks = _ask_inside(requests, state, lanes, ahead, egos, actor)
+        elif not _give_back_inside(requests, state, lanes, ahead, egos, actor):
+            asks = _ask_before(requests, state, lanes, signals, ahead, actor, tick)
+        if asks:
+            _rank(requests, state, lanes, signals, actor, tick)
+            requests.queue[asking] = actor
+            asking += 1
     give_grants(requests, occupancy, state, lanes, signals, egos, asking)
 
 
 @kernel
-def _waits_behind(state: State, ahead: Leaders, actor: int, distance: float) -> bool:
-    """Whether somebody without a grant stands between a vehicle and its stop line."""
-    leader = ahead.actor[actor]
-    return leader >= 0 and ahead.gap_m[actor] < distance and state.grant[leader] < 0
-
-
-@kernel
-def _make_way_for_next(state: State, lanes: Lanes, actor: int) -> None:
-    """On its way through a junction that the next one follows closely, a vehicle asks for that too.
-
-    It cannot wait until its rear has left the first: there is no room for it in between.
-    """
+def _move_grant_on(state: State, lanes: Lanes, actor: int) -> None:
+    """A grant goes on to the next junction that it is for, and ends when the rear has left all."""
     grant = state.grant[actor]
-    link, beyond = state.path[actor, 1], state.path[actor, 2]
-    if grant < 0 or state.lane[actor] != grant or link < 0 or beyond < 0:
-        return
-    if lanes.junction[link] >= 0 or lanes.junction[beyond] < 0 or state.leaving[actor] >= 0:
-        return
-    if lanes.length_m[link] < 2.0 * state.half_length[actor] + STANDING_ROOM_M:
-        state.leaving[actor] = grant
-        state.leaving_m[actor] = state.lane_m[actor] - lanes.length_m[grant]
-        state.grant[actor] = -1
-        state.stopped_at[actor] = -1
-        state.arrival_tick[actor] = -1
-
-
-@kernel
-def _release_grant(state: State, lanes: Lanes, actor: int) -> None:
-    """A grant ends when the vehicle's rear has left the junction."""
-    grant = state.grant[actor]
-    if grant < 0:
-        return
     lane = state.lane[actor]
-    if lane == grant or lanes.junction[lane] == lanes.junction[grant]:
+    if grant < 0 or lane == grant:
         return
-    for step in range(1, PATH_LANES):
-        ahead = state.path[actor, step]
-        if ahead < 0 or lanes.junction[ahead] >= 0:
-            if ahead == grant:
-                return  # still ahead (a path may come back to a junction: only the next counts)
-            break
-    if state.lane_m[actor] >= state.half_length[actor]:
-        state.grant[actor] = -1
-        state.stopped_at[actor] = -1
+    if lanes.junction[lane] >= 0:
+        if lanes.junction[lane] != lanes.junction[grant]:
+            state.grant[actor] = lane
+        return
+    if state.grant_steps[actor] > 0:
+        step, _ = find_entry(state, lanes, actor, 1, NO_LEADER_M)
+        if 0 < step <= state.grant_steps[actor]:
+            state.grant[actor] = state.path[actor, step]
+            return
+    if not is_over_junction(state, lanes, actor):
+        _give_back(state, actor)
+
+
+@kernel
+def _stands_with_grant(state: State, actor: int) -> bool:
+    """Whether a vehicle has had a grant for a while and not moved."""
+    since = min(state.still_ticks[actor], state.tick[()] - state.grant_tick[actor])
+    return since > GIVE_BACK_TICKS
+
+
+@kernel
+def _give_back(state: State, actor: int) -> None:
+    state.grant[actor] = -1
+    state.grant_steps[actor] = 0
+
+
+@kernel
+def _give_back_inside(
+    requests: Requests, state: State, lanes: Lanes, ahead: Leaders, egos: int, actor: int
+) -> bool:
+    """Who stands in a junction for an ego gives its grant back, or both would wait for ever.
+
+    Notes too how far a vehicle with a grant may go for the sake of egos that are in its way.
+    """
+    if state.grant[actor] < 0:
+        return False
+    requests.line_m[actor] = room_before_ego(state, lanes, egos, actor)
+    if lanes.junction[state.lane[actor]] < 0 or not _stands_with_grant(state, actor):
+        return False
+    if requests.line_m[actor] > NEAR_EGO_M and not _is_behind_ego(ahead, egos, actor):
+        return False
+    _give_back(state, actor)
+    return True
+
+
+@kernel
+def _is_behind_ego(ahead: Leaders, egos: int, actor: int) -> bool:
+    return 0 <= ahead.actor[actor] < egos and ahead.gap_m[actor] < NEAR_EGO_M
+
+
+@kernel
+def _ask_inside(
+    requests: Requests, state: State, lanes: Lanes, ahead: Leaders, egos: int, actor: int
+) -> bool:
+    """Notes what a vehicle needs that stands in a junction without a grant; whether it asks."""
+    requests.line_m[actor] = 0.0
+    requests.way[actor] = state.lane[actor]
+    requests.way_step[actor] = 0
+    requests.way_end[actor] = run_end(state, lanes, actor, 0)
+    if state.arrival_tick[actor] < 0:
+        state.arrival_tick[actor] = state.tick[()]
+    return not _is_behind_ego(ahead, egos, actor)
+
+
+@kernel
+def _ask_before(
+    requests: Requests,
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    ahead: Leaders,
+    actor: int,
+    tick: int,
+) -> bool:
+    """Notes what a vehicle meets at the next junction on its path; whether it asks to enter."""
+    speed = state.speed[actor]
+    reach = 10.0 + 1.5 * speed + speed * speed / (2.0 * REQUEST_BRAKING_MPS2)
+    step, distance = find_entry(state, lanes, actor, 1, reach)
+    if step < 0:
         state.arrival_tick[actor] = -1
+        return False
+    approach = state.path[actor, step - 1]
+    note_stop(state, lanes, signals, actor, approach, distance, tick)
+    requests.way_step[actor] = step
+    requests.way_end[actor] = run_end(state, lanes, actor, step)
+    if step <= state.grant_steps[actor]:
+        _keep_or_give_back(requests, state, lanes, signals, ahead, actor, step, distance)
+        return False
+    requests.line_m[actor] = min(distance, requests.line_m[actor])
+    requests.way[actor] = state.path[actor, step]
+    if must_stop(state, lanes, signals, actor, approach):
+        return False
+    return not _waits_behind(requests, state, lanes, ahead, actor, distance)
+
+
+@kernel
+def _keep_or_give_back(
+    requests: Requests,
+    state: State,
+    lanes: Lanes,
+    signals: Signals,
+    ahead: Leaders,
+    actor: int,
+    step: int,
+    distance: float,
+) -> None:
+    """A grant for the junction ahead is taken back at yellow, and where it cannot be used.
+
+    Who is already on its way through a junction that belongs to this one keeps that one's.
+    """
+    speed = state.speed[actor]
+    inside = is_over_junction(state, lanes, actor)
+    approach = state.path[actor, step - 1]
+    if must_stop(state, lanes, signals, actor, approach):
+        if can_stop(speed, distance, yellow_left_s(state, lanes, signals, approach)):
+            requests.line_m[actor] = min(distance, requests.line_m[actor])
+            if not inside:
+                _give_back(state, actor)
+            elif state.stopped_at[actor] != lanes.stop_line[approach]:
+                state.grant_steps[actor] = step - 1
+        return
+    if _stands_with_grant(state, actor) or _waits_behind(
+        requests, state, lanes, ahead, actor, distance
+    ):
+        if not inside and can_stop(speed, distance, 0.0):
+            requests.line_m[actor] = distance
+            _give_back(state, actor)
+            state.arrival_tick[actor] = state.tick[()]
+
+
+@kernel
+def _rank(
+    requests: Requests, state: State, lanes: Lanes, signals: Signals, actor: int, tick: int
+) -> None:
+    """The turn of one who asks: by priority, then by arrival."""
+    arrival = state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else tick
+    step, priority = requests.way_step[actor], 0  # of those who stand in a junction
+    if not is_over_junction(state, lanes, actor):
+        approach, way = state.path[actor, step - 1], requests.way[actor]
+        priority = priority_of(state, lanes, signals, approach, way, tick - arrival)
+    requests.rank[actor] = (as_int64(priority) << 40) + as_int64(arrival)
+
+
+@kernel
+def _waits_behind(
+    requests: Requests, state: State, lanes: Lanes, ahead: Leaders, actor: int, distance: float
+) -> bool:
+    """Whether somebody without a grant stands between a vehicle and its stop line.
+
+    Anybody does, if more than one junction is to be granted: he may stop between them.
+    """
+    leader = ahead.actor[actor]
+    if leader < 0 or ahead.gap_m[actor] >= distance:
+        return False
+    if state.grant[leader] < 0 or requests.way_end[actor] > requests.way_step[actor]:
+        return True
+    length = 2.0 * state.half_length[leader]
+    before_line = ahead.gap_m[actor] + length < distance + OVER_LINE_M
+    step, _ = find_entry(state, lanes, leader, 1, WAITING_M)
+    return before_line and step > state.grant_steps[leader]
 
 
 @kernel
@@ -148,38 +267,114 @@ def give_grants(
 ) -> None:
     """Serves those who ask (`requests.queue[:asking]` with ranks) in order of rank.
 
-    Those who could not go for others' sake are moved to the front of the queue scratch: they keep
-    later ones from taking their turn.
+    Those who could not go are moved to the front of the queue scratch: they keep later ones from
+    taking their turn, or the room for which they wait.
     """
     _sort_queue(requests, asking)
     waiting = 0
     for i in range(asking):
         actor = requests.queue[i]
-        way = requests.way[actor]
-        if not exit_has_room(occupancy, state, lanes, actor, requests.way_step[actor]):
-            requests.full[actor] = 1
+        first, last = requests.way_step[actor], requests.way_end[actor]
+        if somebody_waits_between(occupancy, state, lanes, egos, actor, first, last):
+            requests.shut[actor] = _AHEAD
             continue
-        after = requests.rank[actor] >= (as_int64(1) << 40)
-        if (
-            _blocked_by_queue(requests, lanes, way, waiting)
-            or crosses_holder(occupancy, state, lanes, way, actor)
-            or ego_in_the_way(state, lanes, signals, egos, way, actor, after)
+        if _exit_is_promised(requests, state, actor, waiting) or not exit_has_room(
+            occupancy, state, lanes, actor, last
         ):
+            requests.shut[actor] = _EXIT
             requests.queue[waiting] = actor
             waiting += 1
             continue
-        state.grant[actor] = way
-        occupancy.next_holder[actor] = occupancy.holder[way]
-        occupancy.holder[way] = actor
+        if not _inner_lights_allow(state, lanes, signals, actor, first, last):
+            continue
+        if _meets_ego(requests, state, lanes, signals, egos, actor):
+            requests.shut[actor] = _AHEAD
+            continue
+        if _must_wait(requests, occupancy, state, lanes, actor, waiting):
+            requests.queue[waiting] = actor
+            waiting += 1
+            continue
+        if state.grant[actor] < 0:
+            state.grant[actor] = requests.way[actor]
+        state.grant_steps[actor] = last
+        state.grant_tick[actor] = state.tick[()]
+        requests.line_m[actor] = room_before_ego(state, lanes, egos, actor)
+        claim_ahead(occupancy, state, lanes, actor, first, last)
 
 
 @kernel
-def _blocked_by_queue(requests: Requests, lanes: Lanes, way: int, waiting: int) -> bool:
-    """Whether somebody whose turn comes earlier waits for a way that meets this one."""
-    blocked = False
+def _exit_is_promised(requests: Requests, state: State, actor: int, waiting: int) -> bool:
+    """Whether somebody whose turn comes earlier waits for room in the same exit."""
+    beyond = requests.way_end[actor] + 1
+    if beyond >= PATH_LANES or state.path[actor, beyond] < 0:
+        return False
     for i in range(waiting):
-        blocked = blocked or ways_conflict(lanes, way, requests.way[requests.queue[i]])
-    return blocked
+        other = requests.queue[i]
+        theirs = requests.way_end[other] + 1
+        if requests.shut[other] == _EXIT and theirs < PATH_LANES:
+            if state.path[other, theirs] == state.path[actor, beyond]:
+                return True
+    return False
+
+
+@kernel
+def _inner_lights_allow(
+    state: State, lanes: Lanes, signals: Signals, actor: int, first: int, last: int
+) -> bool:
+    """Whether no light shows red between junctions that belong together, or one waited long."""
+    came = state.arrival_tick[actor]
+    if came >= 0 and state.tick[()] - came > PATIENCE_TICKS:
+        return True
+    for step in range(first, last):
+        line = lanes.stop_line[state.path[actor, step]]
+        if line >= 0 and signals.kind[signals.stop_signal[line]] == _LIGHT:
+            if must_stop(state, lanes, signals, actor, state.path[actor, step]):
+                return False
+    return True
+
+
+@kernel
+def _meets_ego(
+    requests: Requests, state: State, lanes: Lanes, signals: Signals, egos: int, actor: int
+) -> bool:
+    """Whether an ego is in a vehicle's way: then others may go first, for it may stand for ever."""
+    after = requests.rank[actor] >= (as_int64(1) << 40)
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+        way = state.path[actor, step]
+        if lanes.junction[way] >= 0:
+            if ego_in_the_way(state, lanes, signals, egos, way, actor, after):
+                return True
+    return False
+
+
+@kernel
+def _must_wait(
+    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int, waiting: int
+) -> bool:
+    """Whether others come first, on any of the junction lanes that a vehicle asks for."""
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+        way = state.path[actor, step]
+        if lanes.junction[way] >= 0:
+            if _blocked_by_queue(requests, state, lanes, way, waiting) or crosses_claim(
+                occupancy, lanes, way, actor
+            ):
+                return True
+    return False
+
+
+@kernel
+def _blocked_by_queue(
+    requests: Requests, state: State, lanes: Lanes, way: int, waiting: int
+) -> bool:
+    """Whether somebody whose turn comes earlier waits for a way that meets this one."""
+    for i in range(waiting):
+        actor = requests.queue[i]
+        if requests.shut[actor] == _EXIT:
+            continue
+        for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+            if ways_conflict(lanes, way, state.path[actor, step]):
+                return True
+    return False
 
 
 @kernel

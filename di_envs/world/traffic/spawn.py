@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,17 +93,17 @@ def spawn_traffic(
     first: int,
     count: int,
 ) -> None:
-    """Places `count` vehicles in the slots from `first` on, at rest, never on an ego's path.
+    """Places up to `count` vehicles in the slots from `first` on, at rest, none on an ego's path.
 
-    Raises:
-        ValueError: If the town has fewer free places than vehicles.
+    Where the town has fewer free places, as many drive as fit, and a warning says so.
     """
     seed = int(state.seed[()])
     spots = _spots(lanes, tables, plans, seed)
     if len(spots) < count:
-        raise ValueError(
-            f"expected room for {count} vehicles, but the town has {len(spots)} free places; "
-            f"ask for fewer (traffic={len(spots)})"
+        warnings.warn(
+            f"expected room for {count} vehicles, but the town has {len(spots)} free places: "
+            f"{len(spots)} drive; ask for no more to hear nothing of it",
+            stacklevel=2,
         )
     for actor, (lane, station) in enumerate(spots[:count], first):
         _equip(state, actor, seed)

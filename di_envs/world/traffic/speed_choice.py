@@ -167,8 +167,7 @@ def choose_speed(
         leader_braking = EMERGENCY_BRAKING_MPS2 if leaders.actor[actor] < egos else MAX_BRAKING_MPS2
         cap = safe_speed(gap - SAFE_GAP_M, leader_speed, MAX_BRAKING_MPS2, leader_braking)
     line = _busy_crosswalk_gap(state, lanes, tables, busy, actor)
-    if requests.way[actor] >= 0 and state.grant[actor] != requests.way[actor]:
-        line = min(line, requests.distance_m[actor])
+    line = min(line, requests.line_m[actor])
     if line < NO_LEADER_M:
         # as if somebody stood where stopping behind them means stopping at the line
         stand_in = line - LINE_GAP_M + DISTANCE_WANTED_M - CAR_LENGTH_M

@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
 from di_envs.town.lanes import LaneKind
+from di_envs.town.queries import pose_at
 from di_envs.town.town import Town
 
 LATERAL_ACCELERATION_MPS2 = 2.0  # that drivers accept in bends
 SLOWING_MPS2 = 2.0  # with which they slow down for a bend ahead
 SLOWEST_BEND_MPS = 3.0
+ENTRY_M = 5.0  # into a lane by which one comes into the town: more than half the longest vehicle
+ENTRY_LANE_M = 12.0  # a lane by which one comes is at least so long …
+LONG_LANE_M = 60.0  # … or so long, where it has another before it
 
 
 @by_reference
@@ -21,7 +25,11 @@ class TrafficTables(NamedTuple):
     """Arrays over the lanes L, points P and crosswalks X of a town."""
 
     point_speed: NDArray[np.float64]  # (P,) speed limit, bends and slowing for them included [m/s]
-    usable: NDArray[np.int8]  # (L,) 1 where traffic can drive on for ever
+    usable: NDArray[np.int8]  # (L,) 1 where traffic can drive on for ever, or to an open end
+    # where vehicles come into the town (N,), those that have left it by an open end
+    entry_lane: NDArray[np.int32]
+    entry_pose: NDArray[np.float64]  # (N, 2) x, y
+    entry_m: NDArray[np.float64]  # station on the lane
     # junction lanes that begin at the same approach lane: they overlap up to `sibling_end_m`
     sibling_start: NDArray[np.int32]  # (L + 1,)
     sibling_lane: NDArray[np.int32]
@@ -36,9 +44,14 @@ def traffic_tables(town: Town) -> TrafficTables:
     """Computes the tables of a town."""
     siblings = _siblings(town)
     crossings = _crossings(town)
+    usable = _usable_lanes(town)
+    entries = _entries(town, usable)
     return TrafficTables(
         point_speed=_point_speeds(town),
-        usable=_usable_lanes(town),
+        usable=usable,
+        entry_lane=entries[0],
+        entry_pose=entries[1],
+        entry_m=entries[2],
         sibling_start=siblings[0],
         sibling_lane=siblings[1],
         sibling_end_m=siblings[2],
@@ -66,18 +79,53 @@ def _point_speeds(town: Town) -> NDArray[np.float64]:
 
 
 def _usable_lanes(town: Town) -> NDArray[np.int8]:
-    """Driving lanes that lead on for ever: those without a usable successor go, until none does."""
+    """Driving lanes that lead on for ever, or to an open end.
+
+    Those without a usable successor go, until none does. Where a lane ends beside one that goes
+    on, its road only becomes narrower: that is no open end, and nobody drives there.
+    """
     lanes = town.lanes
     usable = (lanes.kind == LaneKind.DRIVING) & (lanes.length_m > 0.0)
+    open_end = _open_ends(town)
     changed = True
     while changed:
         changed = False
-        for lane in np.flatnonzero(usable):
+        for lane in np.flatnonzero(usable & ~open_end):
             ahead = lanes.successor[lanes.successor_start[lane] : lanes.successor_start[lane + 1]]
             if not usable[ahead].any():
                 usable[lane] = False
                 changed = True
     return usable.astype(np.int8)
+
+
+def _open_ends(town: Town) -> NDArray[np.bool_]:
+    """(L,) whether a road ends with this lane: neither it nor one beside it leads on."""
+    lanes = town.lanes
+    ends = np.diff(lanes.successor_start) == 0
+    open_end = (lanes.kind == LaneKind.DRIVING) & ends & (lanes.junction < 0)
+    for lane in np.flatnonzero(open_end):
+        for side in (lanes.left, lanes.right):
+            beside = int(side[lane])
+            while beside >= 0:
+                open_end[lane] &= ends[beside]
+                beside = int(side[beside])
+    return open_end
+
+
+def _entries(
+    town: Town, usable: NDArray[np.int8]
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """Where lanes begin to which none leads; in towns without such, the middles of long lanes."""
+    lanes = town.lanes
+    roads = (usable == 1) & (lanes.junction < 0)
+    first = (np.diff(lanes.predecessor_start) == 0) & (lanes.length_m >= ENTRY_LANE_M)
+    entry = np.flatnonzero(roads & first)
+    station = np.full(entry.size, ENTRY_M)
+    if entry.size == 0:
+        entry = np.flatnonzero(roads & (lanes.length_m >= LONG_LANE_M))
+        station = 0.5 * lanes.length_m[entry]
+    places = [pose_at(lanes, int(k), float(s))[:2] for k, s in zip(entry, station, strict=True)]
+    return entry.astype(np.int32), np.array(places, np.float64).reshape(-1, 2), station
 
 
 def _siblings(

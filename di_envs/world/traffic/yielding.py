@@ -6,7 +6,13 @@ from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import project_to_lane
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S, State
-from di_envs.world.traffic.approach import MOVING_MPS
+from di_envs.world.traffic.approach import (
+    MOVING_MPS,
+    can_stop,
+    find_entry,
+    lane_before_junction,
+)
+from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.occupancy import Occupancy
 
 EGO_TURN_TICKS = round(6.0 / TICK_S)  # for which others let an ego that came first go first
@@ -17,47 +23,21 @@ _LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
-def _rear_on(state: State, lanes: Lanes, actor: int, lane: int) -> float:
-    """Station of a vehicle's rear on a junction lane of its path: negative before it."""
-    s = state.lane_m[actor] - state.half_length[actor]
-    if state.lane[actor] == lane:
-        return s
-    if state.previous_lane[actor] == lane:
-        return lanes.length_m[lane] + s
-    return -1.0
-
-
-@kernel
-def crosses_holder(occupancy: Occupancy, state: State, lanes: Lanes, way: int, actor: int) -> bool:
-    """Whether a vehicle with a grant is still before or in a place where `way` meets its own."""
+def crosses_claim(occupancy: Occupancy, lanes: Lanes, way: int, actor: int) -> bool:
+    """Whether somebody is, or may come, before or in a place where `way` meets his lane."""
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
         other = lanes.conflict_lane[k]
-        if _same_approach(lanes, way, other):
+        row = occupancy.claim[other]
+        if row < 0 or _same_approach(lanes, way, other):
             continue
-        holder = occupancy.holder[other]
-        while holder >= 0:
+        while row >= 0:
             if (
-                holder != actor
-                and _rear_on(state, lanes, holder, other) < (lanes.conflict_other_end_m[k])
+                occupancy.claimant[row] != actor
+                and occupancy.claim_rear_m[row] < lanes.conflict_other_end_m[k]
+                and occupancy.claim_front_m[row] > lanes.conflict_other_begin_m[k]
             ):
                 return True
-            holder = occupancy.next_holder[holder]
-        if _crosses_leaver(occupancy, state, lanes, other, lanes.conflict_other_end_m[k], actor):
-            return True
-    return False
-
-
-@kernel
-def _crosses_leaver(
-    occupancy: Occupancy, state: State, lanes: Lanes, other: int, end_m: float, actor: int
-) -> bool:
-    """Whether the tail of a vehicle that goes on to a near junction is still before station end."""
-    leaver = occupancy.leaver[other]
-    while leaver >= 0:
-        rear = lanes.length_m[other] + state.leaving_m[leaver] - state.half_length[leaver]
-        if leaver != actor and rear < end_m:
-            return True
-        leaver = occupancy.next_leaver[leaver]
+            row = occupancy.next_claim[row]
     return False
 
 
@@ -99,7 +79,10 @@ def ego_in_the_way(
             if lane < 0:
                 break
             if lanes.junction[lane] >= 0:
-                if _ego_meets(state, lanes, way, lane, ego):
+                passed_m = -NO_LEADER_M
+                if state.lane[actor] == way:
+                    passed_m = state.lane_m[actor] + state.half_length[actor]
+                if _ego_meets(state, lanes, way, lane, ego, passed_m):
                     return True
             elif _ego_comes_first(
                 state, lanes, signals, way, lane, ego, actor, ranks_after_priority
@@ -109,16 +92,34 @@ def ego_in_the_way(
 
 
 @kernel
-def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int) -> bool:
-    """Whether an ego on a junction lane is before or in a place where `way` meets it."""
+def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed_m: float) -> bool:
+    """Whether an ego on a junction lane is before or in a place where `way` meets it.
+
+    Once it has stood, it counts only on lanes on which it lies: others do not wait for who waits
+    for them, and drive past it where they can.
+    Places that end before station `passed_m` of the way do not count.
+    """
     if lane == way:
         return False  # it is ahead on the same way: a leader, not a crossing
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
-        if lanes.conflict_lane[k] == lane:
+        if lanes.conflict_lane[k] == lane and lanes.conflict_end_m[k] > passed_m:
             s, _ = project_to_lane(lanes, lane, state.x[ego], state.y[ego])
-            if s - state.half_length[ego] < lanes.conflict_other_end_m[k]:
+            half = state.half_length[ego]
+            if state.still_ticks[ego] > EGO_TURN_TICKS:
+                if not _lies_on(state, ego, way) or s + half < lanes.conflict_other_begin_m[k]:
+                    continue
+            if s - half < lanes.conflict_other_end_m[k]:
                 return True
     return False
+
+
+@kernel
+def _lies_on(state: State, ego: int, lane: int) -> bool:
+    """Whether an ego lies on a lane, or on so many that this may be one of them."""
+    for k in range(OCCUPIED_LANES):
+        if state.occupied[ego, k] == lane:
+            return True
+    return state.occupied[ego, OCCUPIED_LANES - 1] >= 0
 
 
 @kernel
@@ -135,6 +136,7 @@ def _ego_comes_first(
     """Whether an ego at the end of an approach lane has its turn before the vehicle."""
     s, _ = project_to_lane(lanes, approach, state.x[ego], state.y[ego])
     front = lanes.length_m[approach] - s - state.half_length[ego]
+    approach, front = lane_before_junction(lanes, approach, front)
     line = lanes.stop_line[approach]
     signal = signals.stop_signal[line] if line >= 0 else -1
     if signal >= 0 and signals.kind[signal] != _LIGHT:
@@ -157,34 +159,128 @@ def _ego_comes_first(
 
 
 @kernel
-def exit_has_room(
-    occupancy: Occupancy, state: State, lanes: Lanes, actor: int, way_step: int
-) -> bool:
-    """Whether the vehicle would fit behind the last body beyond the junction."""
-    need = 2.0 * state.half_length[actor] + EXIT_MARGIN_M
-    beyond = way_step
-    while beyond < PATH_LANES and (
-        state.path[actor, beyond] >= 0 and lanes.junction[state.path[actor, beyond]] >= 0
-    ):
-        beyond += 1
+def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
+    """From a vehicle's front to the first place ahead in its junctions that an ego is in [m].
+
+    Who stops there leaves the ego its way; who stopped at its side would stand in it. In junctions
+    that the vehicle has not come to yet, an ego that still drives up to the place comes first too.
+    Only places before which the vehicle can still stop count; NO_LEADER_M without one.
+    """
+    nearest = NO_LEADER_M
+    for ego in range(egos):
+        for j in range(OCCUPIED_LANES):
+            other = state.occupied[ego, j]
+            if other < 0:
+                break
+            if lanes.junction[other] < 0:
+                continue
+            s, _ = project_to_lane(lanes, other, state.x[ego], state.y[ego])
+            rear, front = s - state.half_length[ego], s + state.half_length[ego]
+            begin = -state.lane_m[actor] - state.half_length[actor]
+            for step in range(state.grant_steps[actor] + 1):
+                lane = state.path[actor, step]
+                stays = state.still_ticks[ego] > EGO_TURN_TICKS
+                if stays and not _lies_on(state, ego, lane):
+                    begin += lanes.length_m[lane]
+                    continue
+                for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
+                    room = begin + lanes.conflict_begin_m[k]
+                    if (
+                        lanes.conflict_lane[k] == other
+                        and room < nearest
+                        and rear < lanes.conflict_other_end_m[k]
+                        and (front > lanes.conflict_other_begin_m[k] or (step > 0 and not stays))
+                        and can_stop(state.speed[actor], room, 0.0)
+                        and not _same_approach(lanes, lane, other)
+                    ):
+                        nearest = room
+                begin += lanes.length_m[lane]
+    return nearest
+
+
+@kernel
+def exit_has_room(occupancy: Occupancy, state: State, lanes: Lanes, actor: int, last: int) -> bool:
+    """Whether the vehicle would fit behind the last body beyond the junctions.
+
+    Args:
+        last: Place in its path of the last junction lane to be granted.
+    """
+    beyond = last + 1
     if beyond >= PATH_LANES or state.path[actor, beyond] < 0:
         return True
-    exit_lane = state.path[actor, beyond]
-    for k in range(lanes.predecessor_start[exit_lane], lanes.predecessor_start[exit_lane + 1]):
-        holder = occupancy.holder[lanes.predecessor[k]]
-        while holder >= 0:
-            if holder != actor and state.lane[holder] != exit_lane:
-                need += 2.0 * state.half_length[holder] + EXIT_MARGIN_M
-            holder = occupancy.next_holder[holder]
+    need = 2.0 * state.half_length[actor] + EXIT_MARGIN_M
+    need += _room_of_others(occupancy, state, lanes, actor, state.path[actor, beyond])
     offset = 0.0
     for step in range(beyond, PATH_LANES):
         lane = state.path[actor, step]
         if lane < 0 or offset >= need:
             return True
         body = occupancy.first[lane]
+        while body >= 0 and occupancy.actor[body] == actor:
+            body = occupancy.next[body]
         if body >= 0:
             speed = occupancy.speed[body]
             room = offset + occupancy.rear_m[body] + speed * speed / 8.0
             return room >= need
         offset += lanes.length_m[lane]
     return True
+
+
+@kernel
+def _room_of_others(
+    occupancy: Occupancy, state: State, lanes: Lanes, actor: int, exit_lane: int
+) -> float:
+    """Metres of an exit that those need who have a grant to it and are still on the way."""
+    need = 0.0
+    for k in range(lanes.predecessor_start[exit_lane], lanes.predecessor_start[exit_lane + 1]):
+        lane = lanes.predecessor[k]
+        row = occupancy.claim[lane]
+        while row >= 0:
+            other = occupancy.claimant[row]
+            half = state.half_length[other]
+            if other != actor and occupancy.claim_rear_m[row] + half < lanes.length_m[lane]:
+                need += 2.0 * half + EXIT_MARGIN_M
+            row = occupancy.next_claim[row]
+    return need
+
+
+@kernel
+def somebody_waits_between(
+    occupancy: Occupancy,
+    state: State,
+    lanes: Lanes,
+    egos: int,
+    actor: int,
+    first: int,
+    last: int,
+) -> bool:
+    """Whether somebody is, or will come, between junctions that belong together, and stop there.
+
+    Who is short enough may wait where the vehicle itself could not.
+    """
+    for step in range(first, last):
+        lane = state.path[actor, step]
+        body = occupancy.first[lane]
+        while body >= 0:
+            other = occupancy.actor[body]
+            if other < egos:
+                if lanes.junction[lane] < 0:
+                    return True
+            elif other != actor and state.lane[other] == lane:
+                if _will_wait_on(state, lanes, other, actor, first, last):
+                    return True
+            body = occupancy.next[body]
+    return False
+
+
+@kernel
+def _will_wait_on(
+    state: State, lanes: Lanes, other: int, actor: int, first: int, last: int
+) -> bool:
+    """Whether the lane up to which another vehicle may drive is one of these of the path."""
+    step, _ = find_entry(state, lanes, other, state.grant_steps[other] + 1, NO_LEADER_M)
+    if step > 0:
+        for k in range(first, last):
+            if state.path[actor, k] == state.path[other, step - 1]:
+                return True
+    return False

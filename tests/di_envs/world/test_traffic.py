@@ -192,7 +192,7 @@ def test_who_stands_a_hair_before_the_line_loses_the_grant_at_yellow():
     scene.put(0, [WEST_TO_1, NORTH_STRAIGHT], 0.05)
     scene.show("1", 0, ticks=GREEN_TICKS)
     with scene.edit() as state:
-        state.grant[0] = scene.lane(NORTH_STRAIGHT)
+        state.grant[0], state.grant_steps[0] = scene.lane(NORTH_STRAIGHT), 1
     for _ in scene.run(10.0):
         pass
     assert scene.to_end_m(0, WEST_TO_1) == pytest.approx(0.05)
@@ -333,6 +333,7 @@ def test_a_car_that_gets_its_next_grant_does_not_hide_others_who_hold_its_last_o
     shared = scene.lane(FROM_EAST_RIGHT)
     with scene.edit() as state:
         state.grant[1:3] = state.previous_lane[2] = shared
+        state.grant_steps[1] = 1
     for _ in scene.run(0.2):
         pass
     assert scene.state.grant[2] == scene.lane(MIDDLE_RIGHT_AT_1)
