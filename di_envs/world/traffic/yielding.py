@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
-from di_envs.town.queries import project_to_lane
+from di_envs.town.queries import pose_at, project_to_lane
 from di_envs.world.state import OCCUPIED_LANES, PATH_LANES, TICK_S, State
 from di_envs.world.traffic.approach import (
     MOVING_MPS,
@@ -16,6 +18,7 @@ from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.occupancy import Occupancy
 
 EGO_TURN_TICKS = round(6.0 / TICK_S)  # for which others let an ego that came first go first
+PASSING_M = 1.3  # half a wide vehicle, and a hand: from its lane to what it passes
 EXIT_MARGIN_M = 3.0
 
 _GREEN = int(LightState.GREEN)
@@ -106,7 +109,10 @@ def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed
             s, _ = project_to_lane(lanes, lane, state.x[ego], state.y[ego])
             half = state.half_length[ego]
             if state.still_ticks[ego] > EGO_TURN_TICKS:
-                if not _lies_on(state, ego, way) or s + half < lanes.conflict_other_begin_m[k]:
+                if (
+                    not _lies_on(state, lanes, ego, way)
+                    or s + half < lanes.conflict_other_begin_m[k]
+                ):
                     continue
             if s - half < lanes.conflict_other_end_m[k]:
                 return True
@@ -114,12 +120,16 @@ def _ego_meets(state: State, lanes: Lanes, way: int, lane: int, ego: int, passed
 
 
 @kernel
-def _lies_on(state: State, ego: int, lane: int) -> bool:
-    """Whether an ego lies on a lane, or on so many that this may be one of them."""
-    for k in range(OCCUPIED_LANES):
-        if state.occupied[ego, k] == lane:
-            return True
-    return state.occupied[ego, OCCUPIED_LANES - 1] >= 0
+def _lies_on(state: State, lanes: Lanes, ego: int, lane: int) -> bool:
+    """Whether an ego's box leaves a vehicle that follows a lane no room to drive past.
+
+    Measured, as an ego may lie on more lanes of a junction than are noted of it.
+    """
+    s, aside_m = project_to_lane(lanes, lane, state.x[ego], state.y[ego])
+    turn = state.yaw[ego] - pose_at(lanes, lane, s)[3]
+    reach_m = state.half_length[ego] * abs(math.sin(turn))
+    reach_m += state.half_width[ego] * abs(math.cos(turn))
+    return abs(aside_m) < reach_m + PASSING_M
 
 
 @kernel
@@ -180,7 +190,7 @@ def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
             for step in range(state.grant_steps[actor] + 1):
                 lane = state.path[actor, step]
                 stays = state.still_ticks[ego] > EGO_TURN_TICKS
-                if stays and not _lies_on(state, ego, lane):
+                if stays and not _lies_on(state, lanes, ego, lane):
                     begin += lanes.length_m[lane]
                     continue
                 for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
