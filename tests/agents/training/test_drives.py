@@ -32,6 +32,7 @@ from agents.training.towns import town_files
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
 from di_envs.route_env import RouteEnv
+from di_envs.world_version import WORLD_VERSION
 
 SAME = "agents.expert.agent:Expert"  # under another name: a learner that needs no correction
 IDLE = "tests.agents.training.learners:Idle"
@@ -228,7 +229,7 @@ def other_world(folder, monkeypatch):
     ("change", "message"),
     [
         (other_weights, "agent_version was driveinsight 1, files .*, is driveinsight 1, files"),
-        (other_world, "world_version was 1, is 0"),
+        (other_world, f"world_version was {WORLD_VERSION}, is 0"),
     ],
 )
 @pytest.mark.parametrize("dropped", [False, True])

@@ -93,15 +93,19 @@ def test_weights_and_a_declared_version_are_another_footing(here, tree):
     weights = tree / "agents/driveinsight/weights/weights.safetensors"
     weights.write_bytes(weights.read_bytes()[:-1] + b"\0")
     table = tree / "agents" / "__init__.py"
-    table.write_text(table.read_text().replace("version=1,", "version=2,", 1))
+    now, new = AGENTS["expert"].version, AGENTS["expert"].version + 1  # the first in the table
+    table.write_text(table.read_text().replace(f"version={now},", f"version={new},", 1))
     world = tree / "di_envs" / "world_version.py"
-    world.write_text(world.read_text().replace(" = 1", " = 2"))
+    raised = f"WORLD_VERSION = {WORLD_VERSION + 1}"
+    world.write_text(world.read_text().replace(f"WORLD_VERSION = {WORLD_VERSION}", raised))
     ours, theirs = here["agents"], rests_on(tree)["agents"]
     changed = {name for name in ours if ours[name][0] != theirs[name][0]}
     assert changed == {"expert", "driveinsight"}
-    assert theirs["expert"][0] == "expert 2"
+    assert theirs["expert"][0] == f"expert {new}"
     for name in AGENTS:
-        assert footing_differences(ours[name][1], theirs[name][1]) == ["world 1, not 2"]
+        assert footing_differences(ours[name][1], theirs[name][1]) == [
+            f"world {WORLD_VERSION}, not {WORLD_VERSION + 1}"
+        ]
 
 
 def test_another_python_is_written_down_and_is_the_same_footing(monkeypatch):
