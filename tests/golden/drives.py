@@ -100,7 +100,10 @@ GOLDEN: dict[str, GoldenDrive] = {
     ),
     "expert on toy": GoldenDrive(agent="expert", suite="toy", route="4", seconds=9.0, seed=1),
     "expert-blind on toy": GoldenDrive(  # it hits another car
-        agent="expert-blind", suite="toy", route="4", seconds=9.0, seed=1
+        agent="expert-blind", suite="toy", route="4", seconds=7.0, seed=10
+    ),
+    "expert-told on town05_short": GoldenDrive(
+        agent="expert-told", suite="town05_short", route="0", seconds=4.0
     ),
     "expert-redrunner on toy": GoldenDrive(  # it runs a red light
         agent="expert-redrunner", suite="toy", route="0", seconds=6.0
