@@ -173,11 +173,14 @@ def test_negative_numbers_of_actors_are_refused(name):
         WorldConfig(**{name: -1})
 
 
-def test_more_vehicles_than_the_town_has_places_for_are_refused_with_a_number_that_fits():
-    with pytest.raises(ValueError, match=r"ask for fewer \(traffic=(\d+)\)") as error:
-        toy_world(vehicles=1000)
-    places = int(str(error.value).split("traffic=")[1].rstrip(")"))
-    assert toy_world(vehicles=places).view.capacity.vehicles == places
+def test_of_more_vehicles_than_the_town_has_places_for_those_drive_that_fit():
+    with pytest.warns(
+        UserWarning, match=r"room for 1000 vehicles.* free places: \d+ drive"
+    ) as told:
+        world = toy_world(vehicles=1000)
+    places = int(str(told[0].message).split("free places: ")[1].split()[0])
+    driving = world.view.state.kind[1:] != ActorKind.ABSENT
+    assert driving.sum() == places == toy_world(vehicles=places).view.capacity.vehicles
 
 
 def test_an_ego_that_leaves_the_road_hits_the_pole_of_a_light():

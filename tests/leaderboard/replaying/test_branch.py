@@ -152,7 +152,7 @@ def test_an_agent_that_acts_otherwise_than_recorded_is_not_branched(run):
 
 @pytest.mark.parametrize("at_s", [-1.0, 8000.0])
 def test_a_moment_that_was_not_driven_is_refused(run, at_s):
-    with pytest.raises(BranchError, match=r"was driven to 9\.\d+ s: branch it between 0 and"):
+    with pytest.raises(BranchError, match=r"was driven to \d+\.\d+ s: branch it between 0 and"):
         branch(run, run.routes[0], at_s, ())
 
 

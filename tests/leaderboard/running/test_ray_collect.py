@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
+from agents import AGENTS
 from agents.training.collect import collect
+from di_envs.world_version import WORLD_VERSION
 from leaderboard.commands.cli import main
 from leaderboard.commands.ending import EXIT_USAGE
 from leaderboard.running.jobs import SetupError
@@ -42,8 +44,8 @@ def contents(folder):
     [
         ({"CPU": "z80"}, "CPU z80, not "),
         ({"numpy": "1.0"}, r"numpy 1\.0, not "),
-        ({"world": "0"}, "world 0, not 1"),
-        ({"the driver": "expert 0"}, "the driver expert 0, not expert 1"),
+        ({"world": "0"}, f"world 0, not {WORLD_VERSION}"),
+        ({"the driver": "expert 0"}, f"the driver expert 0, not expert {AGENTS['expert'].version}"),
     ],
 )
 def test_a_machine_that_would_give_other_bits_is_refused(other, message):
