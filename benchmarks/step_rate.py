@@ -1,6 +1,7 @@
 """How fast worlds tick and environments step, beside highway-env in the same town, on one core.
 
     python benchmarks/step_rate.py
+    python benchmarks/step_rate.py --against ../before     two checkouts in turn
 
 Prints medians and asserts nothing. Times are of the wall clock: other work on the machine makes
 them worse and never better, so beside each median stands the best round.
@@ -16,30 +17,32 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
+from step_works import (
+    SEED,
+    VEHICLES,
+    WALKERS,
+    WARM_UP_S,
+    Work,
+    drive_works,
+    growth_works,
+    prompt_env,
+    record_drive,
+)
+from two_checkouts import compare
 
-from agents import load_agent
 from di_envs.numerics.kernels import cpu_capability
 from di_envs.route_env import RouteEnv
-from di_envs.town.loading import load_town
-from di_envs.town.town import Town
 from di_envs.world.state import TICK_S
-from di_envs.world.world import World, WorldConfig
 
 PARTS = ("rate", "highway", "growth", "start")
-VEHICLES, WALKERS = 120, 60
-# (vehicles, walkers): first more and more vehicles, then what vehicles and walkers cost alone
-GROWTH = ((30, 60), (60, 60), (120, 60), (240, 60), (120, 0), (240, 0), (0, 60), (0, 120))
-SEED = 0
-WARM_UP_S = 30.0  # of traffic, from a standing start, before anything is timed
 
 # What a user's first lines cost: run in a process of its own.
 FIRST_STEPS = """
@@ -97,7 +100,7 @@ class Bench:
             yield
         self._console.print(f"{what}: {time.perf_counter() - begin:.1f} s", style="dim")
 
-    def time(self, what: str, works: dict[str, tuple[int, Callable[[], Any]]]) -> dict[str, Times]:
+    def time(self, what: str, works: dict[str, Work]) -> dict[str, Times]:
         """Times rounds of each work, all in turn, so that a busy machine is unjust to none.
 
         Args:
@@ -119,47 +122,11 @@ class Bench:
         }
 
 
-def record_drive(env: RouteEnv, seconds: float) -> list[np.ndarray]:
-    """The expert's controls on the first route: to be replayed, bit for bit, without its cost."""
-    agent = load_agent("expert")
-    observation, _ = env.reset(seed=SEED, options={"route": 0})
-    memory = agent.start(env.plan, SEED)
-    controls: list[np.ndarray] = []
-    while len(controls) * env.config.control_dt_s < seconds:
-        control, memory = agent.act({**observation, "world": env.view}, memory)
-        observation, _, terminated, truncated, _ = env.step(control)
-        if terminated or truncated:
-            break
-        controls.append(control)
-    return controls
-
-
 def measure_rates(bench: Bench) -> Times:
     """World ticks and environment steps along a drive of the expert; returns those of the world."""
     with bench.doing("making an environment (compiles, if this is the first run)"):
-        env = RouteEnv(
-            suite="town05_long", observations=("prompt",), traffic=VEHICLES, walkers=WALKERS
-        )
-        controls = record_drive(env, WARM_UP_S + 60.0)
-    warm = round(WARM_UP_S / env.config.control_dt_s)
-    env.reset(seed=SEED, options={"route": 0})
-    for control in controls[:warm]:
-        env.step(control)
-    snapshot, timed = env.save_state(), controls[warm:]
-    doubles = [control[None].astype(np.float64) for control in timed]
-    ticks = env.config.control_ticks
-
-    def step() -> None:
-        env.restore_state(snapshot)
-        for control in timed:
-            env.step(control)
-
-    def advance() -> None:
-        env.restore_state(snapshot)
-        for control in doubles:
-            env.world.advance(control, ticks)
-
-    works = {"world": (len(timed) * ticks, advance), "env": (len(timed), step)}
+        env = prompt_env()
+        works, ticks = drive_works(env), env.config.control_ticks
     times = bench.time("world ticks and environment steps", works)
     world, steps = times["world"], times["env"]
     print(f"\n## Rates with {VEHICLES} vehicles, {WALKERS} walkers and the ego in Town05\n")
@@ -213,32 +180,12 @@ def measure_highway(bench: Bench, world_tick: Times | None) -> None:
 
 def measure_growth(bench: Bench) -> None:
     """The cost of a tick as traffic grows, without an ego."""
-    town, ticks = load_town("town05"), 600
-    works = {
-        f"{vehicles} | {walkers}": (ticks, crowd(town, vehicles, walkers, ticks))
-        for vehicles, walkers in GROWTH
-    }
-    times = bench.time("traffic from 30 to 240 vehicles", works)
+    times = bench.time("traffic from 30 to 240 vehicles", growth_works())
     print("\n## Cost of a world tick as traffic grows (no ego)\n")
     print("| vehicles | walkers | median [µs a tick] | best round |")
     print("|---:|---:|---:|---:|")
     for case, own in times.items():
         print(f"| {case} | {1e6 * own.median_s:.1f} | {1e6 * own.best_s:.1f} |")
-
-
-def crowd(town: Town, vehicles: int, walkers: int, ticks: int) -> Callable[[], Any]:
-    """What drives a world on by some ticks from the same warm state, again and again."""
-    none = np.zeros((0, 3))
-    world = World(town, WorldConfig(vehicles=vehicles, walkers=walkers))
-    world.reset(SEED, ())
-    world.advance(none, round(WARM_UP_S / TICK_S))
-    snapshot = world.save()
-
-    def work() -> None:
-        world.restore(snapshot)
-        world.advance(none, ticks)
-
-    return work
 
 
 def measure_start(bench: Bench) -> None:
@@ -282,15 +229,26 @@ def main() -> None:
     parser.add_argument(
         "--highway-seconds", type=float, default=20.0, help="for highway-env (default: 20)"
     )
+    parser.add_argument(
+        "--against",
+        type=Path,
+        metavar="FOLDER",
+        help="instead of the parts: the checkout in this folder and this one, in turn",
+    )
     arguments = parser.parse_args()
     if arguments.rounds < 1:
         parser.error("--rounds must be at least 1")
+    if arguments.against is not None and not (arguments.against / "di_envs").is_dir():
+        parser.error(f"--against: expected a checkout, with a folder di_envs: {arguments.against}")
     bench = Bench(arguments.rounds, arguments.highway_seconds)
     load = (
         f"; load average {os.getloadavg()[0]:.1f} at the start" if hasattr(os, "getloadavg") else ""
     )
     print(f"{platform.system()}, CPU {cpu_capability()}, {os.cpu_count()} cores{load}.")
     print(f"Python {platform.python_version()}, numba {version('numba')}, numpy {np.__version__}.")
+    if arguments.against is not None:
+        compare(arguments.against.resolve(), arguments.rounds)
+        return
     rate = measure_rates(bench) if "rate" in arguments.parts else None
     if "highway" in arguments.parts:
         measure_highway(bench, rate)

@@ -1,0 +1,125 @@
+"""The works that `step_rate.py` times: a drive replayed, and crowds in town without an ego.
+
+Run as a script it does them on demand, in a process of its own: so two checkouts can take turns.
+It imports only what versions of long ago have too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import di_envs
+from agents import load_agent
+from di_envs.route_env import RouteEnv
+from di_envs.town.loading import load_town
+from di_envs.town.town import Town
+from di_envs.world.state import TICK_S
+from di_envs.world.world import World, WorldConfig
+
+VEHICLES, WALKERS = 120, 60
+# (vehicles, walkers): first more and more vehicles, then what vehicles and walkers cost alone
+GROWTH = ((30, 60), (60, 60), (120, 60), (240, 60), (120, 0), (240, 0), (0, 60), (0, 120))
+SEED = 0
+WARM_UP_S = 30.0  # of traffic, from a standing start, before anything is timed
+DRIVE_S = 60.0  # of a drive that is timed
+CROWD_TICKS = 600
+
+# How many things a work does, and what does them
+Work = tuple[int, Callable[[], Any]]
+
+
+def record_drive(env: RouteEnv, seconds: float) -> list[np.ndarray]:
+    """The expert's controls on the first route: to be replayed, bit for bit, without its cost."""
+    agent = load_agent("expert")
+    observation, _ = env.reset(seed=SEED, options={"route": 0})
+    memory = agent.start(env.plan, SEED)
+    controls: list[np.ndarray] = []
+    while len(controls) * env.config.control_dt_s < seconds:
+        control, memory = agent.act({**observation, "world": env.view}, memory)
+        observation, _, terminated, truncated, _ = env.step(control)
+        if terminated or truncated:
+            break
+        controls.append(control)
+    return controls
+
+
+def drive_works(env: RouteEnv) -> dict[str, Work]:
+    """World ticks (`world`) and environment steps (`env`) along a drive of the expert."""
+    controls = record_drive(env, WARM_UP_S + DRIVE_S)
+    warm = round(WARM_UP_S / env.config.control_dt_s)
+    env.reset(seed=SEED, options={"route": 0})
+    for control in controls[:warm]:
+        env.step(control)
+    snapshot, timed = env.save_state(), controls[warm:]
+    doubles = [control[None].astype(np.float64) for control in timed]
+    ticks = env.config.control_ticks
+
+    def step() -> None:
+        env.restore_state(snapshot)
+        for control in timed:
+            env.step(control)
+
+    def advance() -> None:
+        env.restore_state(snapshot)
+        for control in doubles:
+            env.world.advance(control, ticks)
+
+    return {"world": (len(timed) * ticks, advance), "env": (len(timed), step)}
+
+
+def prompt_env() -> RouteEnv:
+    """The environment whose steps are timed."""
+    return RouteEnv(
+        suite="town05_long", observations=("prompt",), traffic=VEHICLES, walkers=WALKERS
+    )
+
+
+def crowd(town: Town, vehicles: int, walkers: int) -> Work:
+    """Drives a world on by some ticks from the same warm state, again and again."""
+    none = np.zeros((0, 3))
+    world = World(town, WorldConfig(vehicles=vehicles, walkers=walkers))
+    world.reset(SEED, ())
+    world.advance(none, round(WARM_UP_S / TICK_S))
+    snapshot = world.save()
+
+    def work() -> None:
+        world.restore(snapshot)
+        world.advance(none, CROWD_TICKS)
+
+    return CROWD_TICKS, work
+
+
+def growth_works() -> dict[str, Work]:
+    """The crowds of `GROWTH`, by `vehicles | walkers`."""
+    town = load_town("town05")
+    return {
+        f"{vehicles} | {walkers}": crowd(town, vehicles, walkers) for vehicles, walkers in GROWTH
+    }
+
+
+def main() -> None:
+    """Does one round of each work named on the standard input, and says its processor time."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="the checkout that must be the one imported")
+    folder = parser.parse_args().folder
+    here = Path(di_envs.__file__).resolve().parents[1]
+    if here != folder.resolve():
+        sys.exit(f"expected di_envs of {folder}, but that of {here} was imported")
+    works = {**drive_works(prompt_env()), **growth_works()}
+    print("ready", flush=True)
+    for line in sys.stdin:
+        count, work = works[line.strip()]
+        begin = time.process_time()
+        work()
+        print((time.process_time() - begin) / count, flush=True)
+
+
+if __name__ == "__main__":
+    main()
