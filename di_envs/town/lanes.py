@@ -47,7 +47,8 @@ class Lanes(NamedTuple):
     junction: Int32  # index into Town.junction_names, -1 outside junctions
     turn: Int8  # Turn, for driving lanes inside junctions
     length_m: Float64
-    spacing_m: Float64  # between points
+    spacing_m: Float64  # between points, along the lane
+    longest_step_m: Float64  # the greatest distance between two neighbours, seen from above
     speed_limit_mps: Float64
     first: Int32  # first point
     count: Int32  # type: ignore[assignment]  # number of points, at least 2

@@ -103,6 +103,8 @@ def _touches(
     gap_y = min(max(right, -half_width), half_width) - right
     if gap_x * gap_x + gap_y * gap_y >= 0.25 * width * width:
         return False
+    if gap_x == 0.0 and gap_y == 0.0:  # the point is in the box
+        return True
     return abs(gap_x * math.cos(turn) + gap_y * math.sin(turn)) <= _ABREAST_M
 
 

@@ -14,6 +14,7 @@ from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import LaneKind, Lanes
 
+STRIDE = 32  # points between those of a lane that are looked at first
 LEVEL_M = 2.5  # a lane further above or below does not count
 DRIVING_MASK = 1 << int(LaneKind.DRIVING)
 
@@ -102,12 +103,25 @@ def square_to(lanes: Lanes, point: int, x: float, y: float) -> float:
 
 @kernel
 def _nearest_point(lanes: Lanes, lane: int, x: float, y: float) -> int:
-    """Which of a lane's points, counted along it, is nearest."""
-    nearest, least = 0, 1e30
-    for k in range(lanes.count[lane]):
-        square = square_to(lanes, lanes.first[lane] + k, x, y)
+    """Which of a lane's points, counted along it, is nearest, the first of several as near.
+
+    It leaps over those that cannot be: `n` points on from one that is `d` away, none is nearer than
+    `d` less `n` of the lane's longest steps.
+    """
+    first, count, step = lanes.first[lane], lanes.count[lane], lanes.longest_step_m[lane]
+    nearest, least = 0, square_to(lanes, first, x, y)
+    for k in range(STRIDE, count, STRIDE):
+        square = square_to(lanes, first + k, x, y)
         if square < least:
             nearest, least = k, square
+    best_m = math.sqrt(least)
+    k = 0
+    while k < count:
+        square = square_to(lanes, first + k, x, y)
+        if square < least or (square == least and k < nearest):
+            nearest, least, best_m = k, square, math.sqrt(square)
+        # the last one leapt over is a whole step further away than the best: rounding is nothing
+        k += max(int((math.sqrt(square) - best_m) / step), 1)
     return nearest
 
 

@@ -8,12 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.arrays import Bool, Float64, Int8, Int32
+from di_envs.numerics.arrays import Bool, Float64, Int8, Int32, Int64
 from di_envs.town.lanes import LaneKind, Lanes, Turn
 from di_envs.town.reading.conflicts import find_conflicts
 from di_envs.town.reading.links import as_ranges, find_successors, reversed_links
 from di_envs.town.reading.records import OpenDrive
-from di_envs.town.reading.sampling import LaneGeometry, Samples, sample_lanes
+from di_envs.town.reading.sampling import (
+    MINIMUM_LANE_LENGTH,
+    LaneGeometry,
+    Samples,
+    sample_lanes,
+)
 from di_envs.town.reading.stretches import Stretch, find_stretches
 
 DEFAULT_SPEED_MPS = 50.0 / 3.6  # where neither a lane, its road nor a neighbour along it says
@@ -92,6 +97,7 @@ def _assemble(
         turn=_turns(stretches, junction, samples, first),
         length_m=samples.length,
         spacing_m=samples.length / (samples.counts - 1),
+        longest_step_m=_longest_steps(samples.points, lane, len(stretches)),
         speed_limit_mps=_speed_limits(document, stretches, geometry, successors, predecessors),
         first=first.astype(np.int32),
         count=samples.counts.astype(np.int32),
@@ -111,6 +117,15 @@ def _assemble(
         **_spatial_index(samples.points),
     )
     return lanes._replace(**find_conflicts(lanes))
+
+
+def _longest_steps(points: Float64, lane: Int64, lanes: int) -> Float64:
+    """(L,) the greatest distance [m] between two neighbours among a lane's points, above 0."""
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    same = np.diff(lane) == 0
+    longest = np.full(lanes, MINIMUM_LANE_LENGTH)
+    np.maximum.at(longest, lane[1:][same], steps[same])
+    return longest
 
 
 def _no_conflicts(count: int) -> dict[str, Any]:

@@ -20,6 +20,7 @@ LATERAL_SPEED_MPS = 1.2  # of a lane change
 LATERAL_SHARE = 0.25  # of the forward speed, at most
 INDICATE_M = 30.0
 BRAKE_LIGHT_MPS2 = -0.8
+AXLE_SHARE = 0.6  # of half the length, from the middle to an axle
 REROUTE_TICKS = round(20.0 / TICK_S)  # of standing still after which one leaves a shut way …
 REROUTE_EVERY_TICKS = round(2.0 / TICK_S)  # … to others, if the next draw is another way
 
@@ -101,11 +102,27 @@ def move_vehicle(
     _drift_to_centre(state, actor, moved)
     state.brake_light[actor] = 1 if state.acceleration[actor] < BRAKE_LIGHT_MPS2 else 0
     state.indicator[actor] = _indicator(state, lanes, actor)
+    if speed == 0.0 and moved == 0.0 and _keeps_place(state, lanes, actor):
+        state.yaw_rate[actor] = 0.0
+        return
     yaw = state.yaw[actor]
     place_vehicle(state, lanes, actor)
     turn = state.yaw[actor] - yaw
     turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
     state.yaw_rate[actor] = turn / TICK_S
+
+
+@kernel
+def _keeps_place(state: State, lanes: Lanes, actor: int) -> bool:
+    """Whether a vehicle that stood and stands is where it was placed: it need not be again.
+
+    Not who was hit, who may have been thrown, nor who changes lanes, whose yaw depends on the speed
+    before; nor where the front axle is on the next lane, for the way may have been drawn anew.
+    """
+    if state.lateral_m[actor] != 0.0 or state.shock_ticks[actor] > 0:
+        return False
+    front_m = state.lane_m[actor] + AXLE_SHARE * state.half_length[actor]
+    return front_m <= lanes.length_m[state.lane[actor]]
 
 
 @kernel
@@ -184,7 +201,7 @@ def _indicator(state: State, lanes: Lanes, actor: int) -> int:
 @kernel
 def place_vehicle(state: State, lanes: Lanes, actor: int) -> None:
     """Sets a vehicle's pose: its axles run on the lane, so long bodies swing as they do."""
-    axle = 0.6 * state.half_length[actor]
+    axle = AXLE_SHARE * state.half_length[actor]
     front_x, front_y, front_z, _ = _point_on_path(state, lanes, actor, axle)
     rear_x, rear_y, rear_z, _ = _point_on_path(state, lanes, actor, -axle)
     yaw = math.atan2(front_y - rear_y, front_x - rear_x)

@@ -177,14 +177,15 @@ def _ask_before(
     approach = state.path[actor, step - 1]
     note_stop(state, lanes, signals, actor, approach, distance, tick)
     requests.way_step[actor] = step
-    requests.way_end[actor] = run_end(state, lanes, actor, step)
     if step <= state.grant_steps[actor]:
+        requests.way_end[actor] = run_end(state, lanes, actor, step)
         _keep_or_give_back(requests, state, lanes, signals, ahead, actor, step, distance)
         return False
     requests.line_m[actor] = min(distance, requests.line_m[actor])
     requests.way[actor] = state.path[actor, step]
     if must_stop(state, lanes, signals, actor, approach):
         return False
+    requests.way_end[actor] = run_end(state, lanes, actor, step)
     return not _waits_behind(requests, state, lanes, ahead, actor, distance)
 
 

@@ -29,6 +29,7 @@ from di_envs.world.traffic.tables import SLOWING_MPS2, TrafficTables
 
 LINE_GAP_M = 0.8  # at which vehicles stop before a line
 SAFE_GAP_M = 0.4
+FAST_MPS = 1e9  # faster than anybody may
 
 _ABSENT = int(ActorKind.ABSENT)
 
@@ -113,13 +114,15 @@ def allowed_speed(state: State, lanes: Lanes, tables: TrafficTables, actor: int)
     index = min(max(index, 0), lanes.count[lane] - 1)
     speed = tables.point_speed[lanes.first[lane] + index]
     distance = lanes.length_m[lane] - state.lane_m[actor]
+    least = FAST_MPS * FAST_MPS
     for step in range(1, PATH_LANES):
         ahead = state.path[actor, step]
         if ahead < 0 or distance > 80.0:
             break
         there = tables.point_speed[lanes.first[ahead]]
-        speed = min(speed, math.sqrt(there * there + 2.0 * SLOWING_MPS2 * max(distance, 0.0)))
+        least = min(least, there * there + 2.0 * SLOWING_MPS2 * max(distance, 0.0))
         distance += lanes.length_m[ahead]
+    speed = min(speed, math.sqrt(least))  # one root: that of the least is the least of the roots
     return max(speed * state.desired_factor[actor], 1.0)
 
 

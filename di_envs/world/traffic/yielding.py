@@ -184,6 +184,8 @@ def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
                 break
             if lanes.junction[other] < 0:
                 continue
+            if not _meets(state, lanes, actor, other):
+                continue
             s, _ = project_to_lane(lanes, other, state.x[ego], state.y[ego])
             rear, front = s - state.half_length[ego], s + state.half_length[ego]
             begin = -state.lane_m[actor] - state.half_length[actor]
@@ -206,6 +208,18 @@ def room_before_ego(state: State, lanes: Lanes, egos: int, actor: int) -> float:
                         nearest = room
                 begin += lanes.length_m[lane]
     return nearest
+
+
+@kernel
+def _meets(state: State, lanes: Lanes, actor: int, other: int) -> bool:
+    """Whether a junction lane meets one of the lanes that a vehicle has a grant for, or is on."""
+    for step in range(state.grant_steps[actor] + 1):
+        lane = state.path[actor, step]
+        if lanes.junction[lane] == lanes.junction[other]:  # lanes of two junctions never meet
+            for k in range(lanes.conflict_start[lane], lanes.conflict_start[lane + 1]):
+                if lanes.conflict_lane[k] == other:
+                    return True
+    return False
 
 
 @kernel

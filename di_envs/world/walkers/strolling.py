@@ -16,7 +16,14 @@ from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.struck import DOWN, lie, take_away
 from di_envs.world.walkers.crossing import is_blocked, may_cross
 from di_envs.world.walkers.neighbours import Neighbours, cell_of, cells_around, fill_neighbours
-from di_envs.world.walkers.on_edges import guide_of, is_over, place_on_edge, road_part, travelled
+from di_envs.world.walkers.on_edges import (
+    Place,
+    guide_of,
+    is_over,
+    place_on_edge,
+    road_part,
+    travelled,
+)
 from di_envs.world.walkers.personal_space import step_aside, step_is_free
 from di_envs.world.walkers.walk_graph import WalkGraph
 
@@ -109,10 +116,13 @@ def _go_on(state: State, walk: WalkGraph, walker: int) -> None:
 
 
 @kernel
-def _lead_on(state: State, walk: WalkGraph, walker: int, pace: float) -> bool:
-    """Moves a walker's guide on by a tick; returns whether it could, as the body is near enough.
+def _lead_on(state: State, walk: WalkGraph, walker: int, pace: float) -> tuple[bool, Place]:
+    """Moves a walker's guide on by a tick, if the body is near enough.
 
     It leaves a crosswalk only when the body is off the road.
+
+    Returns:
+        (whether it could, the guide's place then).
     """
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
     station = state.walk_m[walker]
@@ -120,26 +130,31 @@ def _lead_on(state: State, walk: WalkGraph, walker: int, pace: float) -> bool:
     if not 0.0 <= ahead <= walk.length_m[edge]:
         if walk.crosswalk[edge] < 0 or is_over(state, walk, walker):
             _go_on(state, walk, walker)
-            return True
+            return True, guide_of(state, walk, walker)
         ahead = min(max(ahead, 0.0), walk.length_m[edge])
-    x, y, _z, _yaw = place_on_edge(walk, edge, ahead, direction)
-    dx, dy = x - state.x[walker], y - state.y[walker]
+    guide = place_on_edge(walk, edge, ahead, direction)
+    dx, dy = guide[0] - state.x[walker], guide[1] - state.y[walker]
     if ahead == station or dx * dx + dy * dy > LEASH_M * LEASH_M:
-        return False
+        return False, guide_of(state, walk, walker)
     state.walk_m[walker] = ahead
-    return True
+    return True, guide
 
 
 @kernel
 def _follow_guide(
-    state: State, walk: WalkGraph, near: Neighbours, walker: int, pace: float, bodies: int
+    state: State,
+    walk: WalkGraph,
+    near: Neighbours,
+    walker: int,
+    pace: float,
+    guide: Place,
+    bodies: int,
 ) -> bool:
     """Moves the body towards its guide: corners are cut, not leapt, and others gone round.
 
     Returns:
         Whether it could; not where others leave no room.
     """
-    guide = guide_of(state, walk, walker)
     before_x, before_y = state.x[walker], state.y[walker]
     dx, dy = guide[0] - before_x, guide[1] - before_y
     distance = math.sqrt(dx * dx + dy * dy)
@@ -206,15 +221,24 @@ def _walk_on(
         _stand(state, walker, 1 if queues else 0)
         return
     still = state.still_ticks[walker]
-    led = _lead_on(state, walk, walker, pace)
-    if _follow_guide(state, walk, near, walker, pace, bodies):
+    led, guide = _lead_on(state, walk, walker, pace)
+    if _follow_guide(state, walk, near, walker, pace, guide, bodies):
         state.walk_waiting[walker] = 0
     else:
         _stand(state, walker, 0)
     state.still_ticks[walker] = 0 if led else still + 1
-    share = uniform(int(state.seed[()]), PACE_STREAM, 1, walker)
-    if state.still_ticks[walker] > (1.0 + share) * PATIENCE_TICKS:
+    if _has_lost_patience(state, walker):
         _turn_back(state, walker)
+
+
+@kernel
+def _has_lost_patience(state: State, walker: int) -> bool:
+    """Whether others have been in a walker's way for longer than he bears."""
+    still = state.still_ticks[walker]
+    if still <= PATIENCE_TICKS:  # nobody has less: no need to draw
+        return False
+    share = uniform(int(state.seed[()]), PACE_STREAM, 1, walker)
+    return still > (1.0 + share) * PATIENCE_TICKS
 
 
 @kernel

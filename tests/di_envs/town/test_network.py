@@ -94,6 +94,16 @@ def test_points_on_an_outer_lane_of_a_bend_are_evenly_spaced(tmp_path):
     assert steps.max() <= 0.5
 
 
+def test_the_longest_step_of_a_lane_is_over_the_jump_in_its_width(tmp_path):
+    """From 3 to 9 m in one place: its middle leaps by half of that to the side."""
+    wider = (
+        '<width sOffset="0" a="3" b="0" c="0" d="0"/><width sOffset="20" a="9" b="0" c="0" d="0"/>'
+    )
+    town = load(opendrive(road("1", 40.0, section(0.0, lane(-1, width=wider)))), tmp_path)
+    step = town.lanes.spacing_m[0]
+    assert 3.0 < town.lanes.longest_step_m[0] <= math.hypot(3.0, step) + 1e-9
+
+
 def test_yaw_does_not_jump_where_it_passes_a_half_turn(tmp_path):
     circle = 2.0 * math.pi * 30.0
     line = geometry(circle, heading=3.0, shape=f'<arc curvature="{1 / 30!r}"/>')

@@ -226,6 +226,40 @@ def test_a_projection_gives_back_station_and_lateral(curve, s, lateral, error):
         assert found[1] == pytest.approx(lateral, abs=0.01)
 
 
+def leaping(lanes, lane_, by_m):
+    """The lanes, the further half of one lane by so many metres further to the east and north."""
+    points = lanes.points.copy()
+    own = slice(lanes.first[lane_], lanes.first[lane_] + lanes.count[lane_])
+    points[own][lanes.count[lane_] // 2 :, :2] += by_m
+    longest = lanes.longest_step_m.copy()
+    longest[lane_] = np.hypot(*np.diff(points[own, :2], axis=0).T).max()
+    return lanes._replace(points=points, longest_step_m=longest)
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    x=st.floats(-150.0, 250.0),
+    y=st.floats(-150.0, 150.0),
+    leap=st.one_of(st.just(0.0), st.floats(-60.0, 60.0)),
+)
+def test_a_projection_is_onto_the_nearest_of_all_points_of_the_lane(curve, x, y, leap):
+    lanes = leaping(curve, 0, leap)
+    places = lanes.points[lanes.first[0] : lanes.first[0] + lanes.count[0], :2]
+    dx, dy = places[:, 0] - x, places[:, 1] - y
+    nearest = int(np.argmin(dx * dx + dy * dy))  # the first of several
+    from_there = project_to_lane(lanes, 0, x, y, nearest * float(lanes.spacing_m[0]))
+    assert project_to_lane(lanes, 0, x, y) == from_there
+
+
+def test_of_two_points_as_near_the_first_is_the_nearest(curve):
+    """The sixth and the thirty-third, where all others are 10 m away."""
+    points = np.full_like(curve.points, 0.0)
+    points[:, 0] = 10.0
+    points[[5, 32], 0] = 0.0
+    lanes = curve._replace(points=points, longest_step_m=np.array([10.0]))
+    assert project_to_lane(lanes, 0, 0.0, 0.0)[0] == pytest.approx(5 * curve.spacing_m[0])
+
+
 @pytest.fixture(scope="module")
 def curve(tmp_path_factory):
     line = geometry(94.2, shape=f'<arc curvature="{1 / 60!r}"/>')

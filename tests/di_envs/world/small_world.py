@@ -81,6 +81,7 @@ def make_lanes(specs: tuple[LaneSpec, ...] = LANES) -> Lanes:
         "stop_line": np.array([spec.stop_line for spec in specs], np.int32),
         "length_m": lengths,
         "spacing_m": lengths / (counts - 1),
+        "longest_step_m": lengths / (counts - 1),
         "speed_limit_mps": np.full(len(specs), 14.0),
         "first": (np.cumsum(counts) - counts).astype(np.int32),
         "count": counts,

@@ -18,7 +18,7 @@ from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.dynamics import locate_ego
 from di_envs.world.lights import GREEN_TICKS
-from di_envs.world.state import TICK_S, ActorKind, State
+from di_envs.world.state import TICK_S, ActorKind, State, views_of
 from di_envs.world.traffic.approach import can_stop
 from di_envs.world.traffic.car_following import (
     ACCELERATION_MPS2,
@@ -27,6 +27,7 @@ from di_envs.world.traffic.car_following import (
     idm_acceleration,
     safe_speed,
 )
+from di_envs.world.traffic.motion import place_vehicle
 from di_envs.world.traffic.spawn import EGO_CLEARANCE_M, ROUTE_CLEARANCE_M, VEHICLES
 from di_envs.world.traffic.speed_choice import LINE_GAP_M
 from di_envs.world.world import World, WorldConfig
@@ -450,3 +451,21 @@ def _touch(state: State, a: int, b: int) -> bool:
         for i in (a, b)
     ]
     return bool(boxes_overlap(*boxes[0], *boxes[1])) and abs(state.z[a] - state.z[b]) < 3.0
+
+
+def test_who_stands_is_where_he_would_be_placed_anew():
+    """Those who stand are not placed each tick: nothing that their place depends on may change."""
+    town = load_town("town05")
+    world = World(town, WorldConfig(vehicles=120, walkers=0))
+    world.reset(3, ())
+    for _ in range(20):
+        world.advance(np.zeros((0, 3)), 50)
+        state = world.save()
+        record = np.frombuffer(state.record.tobytes(), state.record.dtype).copy()
+        anew = views_of(record)
+        stands = np.flatnonzero((anew.kind != ActorKind.ABSENT) & (anew.speed == 0.0))
+        stands = stands[anew.lateral_m[stands] == 0.0]
+        for actor in stands:
+            place_vehicle(anew, town.lanes, actor)
+        assert len(stands) > 10
+        assert record.tobytes() == state.record.tobytes()
