@@ -24,6 +24,7 @@ from di_envs.world.world import World, WorldConfig
 LOOK_TICKS = 10
 LONG_S = 120.0
 REACH_M = 12.0  # no two vehicles touch whose middles are further apart
+AWAY_M = 3.0  # who has not come so far from a place in `LONG_S` is stuck there, if he walks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,9 +33,10 @@ class Soaked:
 
     Attributes:
         vehicles: How many drove, or waited to come back, at the end.
-        collisions: How many pairs of vehicles overlapped, each counted once.
+        collisions: How many pairs overlapped of which one is a vehicle, each counted once.
         longest_s: The longest stand that did not end at a red light.
         standing: Vehicles that stood longer than `LONG_S`, but at reds.
+        stuck: Walkers who stayed longer than `LONG_S` within `AWAY_M` of a place.
         speed_mps: Mean speed over all that drove.
         wall_s: Wall time of all of it.
     """
@@ -43,6 +45,7 @@ class Soaked:
     collisions: int
     longest_s: float
     standing: int
+    stuck: int
     speed_mps: float
     wall_s: float
 
@@ -55,12 +58,21 @@ def soak(town: Town, seed: int, vehicles: int, walkers: int, minutes: float) -> 
     state, none = world.view.state, np.zeros((0, 3))
     pairs: set[tuple[int, int]] = set()
     standing: set[int] = set()
+    stuck: set[int] = set()
     longest, speeds = 0.0, []
+    first, end = vehicles, vehicles + walkers
+    anchor, anchored = np.full((walkers, 2), np.inf), np.zeros(walkers)
     for _ in range(round(minutes * 60.0 / TICK_S / LOOK_TICKS)):
         world.advance(none, LOOK_TICKS)
         here = np.flatnonzero(state.kind[:vehicles] != ActorKind.ABSENT)
         speeds.append(float(state.speed[here].mean()) if here.size else 0.0)
-        pairs |= _touching(state, here)
+        people = first + np.flatnonzero(state.kind[first:end] == ActorKind.WALKER)
+        pairs |= _touching(state, here, np.concatenate([here, people]))
+        places = np.column_stack([state.x[first:end], state.y[first:end]])
+        moved = np.hypot(*(places - anchor).T) > AWAY_M
+        anchor[moved], anchored[moved] = places[moved], state.tick[()]
+        stays = (state.tick[()] - anchored) * TICK_S > LONG_S
+        stuck |= set(np.flatnonzero(stays[people - first]).tolist())
         for actor in here[state.still_ticks[here] * TICK_S > longest].tolist():
             if not _waits_at_red(town, state, actor):
                 longest = float(state.still_ticks[actor]) * TICK_S
@@ -73,23 +85,27 @@ def soak(town: Town, seed: int, vehicles: int, walkers: int, minutes: float) -> 
         collisions=len(pairs),
         longest_s=longest,
         standing=len(standing),
+        stuck=len(stuck),
         speed_mps=float(np.mean(speeds)),
         wall_s=time.perf_counter() - begin,
     )
 
 
-def _touching(state: State, here: np.ndarray) -> set[tuple[int, int]]:
-    x, y, z = state.x[here], state.y[here], state.z[here]
-    near = np.hypot(x[:, None] - x, y[:, None] - y) < REACH_M
-    near &= np.abs(z[:, None] - z) < 3.0
+def _touching(state: State, vehicles: np.ndarray, others: np.ndarray) -> set[tuple[int, int]]:
+    away_x = state.x[vehicles][:, None] - state.x[others]
+    away_y = state.y[vehicles][:, None] - state.y[others]
+    near = np.hypot(away_x, away_y) < REACH_M
+    near &= np.abs(state.z[vehicles][:, None] - state.z[others]) < 3.0
+    near &= vehicles[:, None] < others
     found = set()
-    for i, j in np.argwhere(np.triu(near, 1)):
+    for i, j in np.argwhere(near):
+        pair = int(vehicles[i]), int(others[j])
         boxes = [
             (state.x[a], state.y[a], state.yaw[a], state.half_length[a], state.half_width[a])
-            for a in (int(here[i]), int(here[j]))
+            for a in pair
         ]
         if boxes_overlap(*boxes[0], *boxes[1]):
-            found.add((int(here[i]), int(here[j])))
+            found.add(pair)
     return found
 
 
@@ -123,7 +139,8 @@ def main() -> None:
             print(
                 f"{town.name}, seed {seed}: {found.vehicles} vehicles, {found.collisions} pairs "
                 f"collided, longest stand but at reds {found.longest_s:.0f} s, {found.standing} "
-                f"over {LONG_S:.0f} s, {found.speed_mps:.2f} m/s, {found.wall_s:.0f} s"
+                f"over {LONG_S:.0f} s, {found.stuck} walkers stuck, {found.speed_mps:.2f} m/s, "
+                f"{found.wall_s:.0f} s"
             )
 
 

@@ -11,7 +11,7 @@ from agents.expert.hiding import note_hiding_place
 from agents.expert.junction import JunctionAhead
 from agents.expert.path import DrivePath
 from agents.expert.people import SPARE_S, is_on_foot, note_person
-from agents.expert.progress import Progress, height_at, project
+from agents.expert.progress import Progress, height_at, lane_after_change, project, shift_at
 from agents.expert.sight import (
     BEST,
     FRONT_OK,
@@ -32,6 +32,7 @@ from di_envs.world.state import ActorKind
 
 LEVEL_M = 3.0  # whoever is further above or below is on another level
 LOOK_M, LOOK_S = 35.0, 4.0  # others are looked at within this and the way driven in this time
+CHANGE_LOOK_M = 100.0  # and within this where lanes are to be changed: who comes may be fast
 BACK_M = 60.0  # of path behind the car, where followers are
 CROSSING_RAD = 0.6  # whoever stands at more than this angle to the path crosses it
 LEADER_BRAKING_MPS2 = 8.0  # what the vehicle ahead may do
@@ -72,17 +73,20 @@ class Shadow(NamedTuple):
 
 
 @kernel
-def _shadow_of(visible: Visible, seen: Seen) -> Shadow:
+def _shadow_of(visible: Visible, seen: Seen, ahead: JunctionAhead) -> Shadow:
     """A vehicle laid onto the path.
 
     One that changes lanes counts where it is and where its indicator and its heading lead it.
+    Beside the car in a junction both say that it turns as the car does.
     """
     row = seen.row
     cos, sin = math.cos(seen.turn_rad), math.sin(seen.turn_rad)
     half_length, half_width = visible.half_length[row], visible.half_width[row]
     length = half_length * abs(cos) + half_width * abs(sin)
     aside = seen.offset_m
-    if visible.indicator[row] * seen.turn_rad > DRIFT_RAD and abs(seen.turn_rad) < CROSSING_RAD:
+    drifts = visible.indicator[row] * seen.turn_rad > DRIFT_RAD
+    turns = ahead.begin_m < seen.station_m + length and seen.station_m - length < ahead.end_m
+    if drifts and not turns and abs(seen.turn_rad) < CROSSING_RAD:
         aside += visible.indicator[row] * CHANGE_M
     return Shadow(
         seen.station_m - length,
@@ -98,6 +102,7 @@ def _shadow_of(visible: Visible, seen: Seen) -> Shadow:
 @kernel
 def _note_vehicle(
     sight: Sight,
+    path: DrivePath,
     visible: Visible,
     seen: Seen,
     progress: Progress,
@@ -109,6 +114,7 @@ def _note_vehicle(
 
     Args:
         sight: What the car knows so far; changed.
+        path: The route's path.
         visible: What is in sight.
         seen: The vehicle.
         progress: Where the car is on the path.
@@ -116,9 +122,12 @@ def _note_vehicle(
         ahead: The next junction.
         numbers: From `ExpertConfig`.
     """
-    shadow = _shadow_of(visible, seen)
-    if shift != 0.0 and _is_beside(shadow, shift, visible.half_width[CAR]):
-        _note_gap(sight, visible, shadow, progress, numbers)
+    shadow = _shadow_of(visible, seen, ahead)
+    if shift != 0.0:
+        here, _, _ = shift_at(path, progress, seen.station_m)
+        lane = lane_after_change(path, progress.changes, seen.station_m)
+        if _is_beside(shadow, here - lane, visible.half_width[CAR]):
+            _note_gap(sight, visible, shadow, progress, numbers)
     reach = visible.half_width[CAR] + shadow.half_width_m
     if visible.kind[seen.row] < _PROP:  # poles stand close to where one drives, and stay there
         reach += numbers.side_margin_m
@@ -139,7 +148,10 @@ def _note_vehicle(
 
 @kernel
 def _is_beside(shadow: Shadow, shift: float, half_width: float) -> bool:
-    """Whether a vehicle is on the lane to change to, beside a car that is so wide."""
+    """Whether a vehicle is on the lane to change to, in the way of a car that is so wide.
+
+    `shift` is the offset of the path from that lane where the vehicle is.
+    """
     off_lane = min(abs(shadow.offset_m + shift), abs(shadow.aside_m + shift))
     return off_lane - shadow.half_width_m < half_width + 0.2
 
@@ -227,9 +239,11 @@ def look(
         times: From `forecast`.
         numbers: From `ExpertConfig`.
     """
-    reach = LOOK_M + LOOK_S * visible.speed[CAR]
+    reach, back = LOOK_M + LOOK_S * visible.speed[CAR], BACK_M
+    if shift != 0.0:
+        reach, back = max(reach, CHANGE_LOOK_M), CHANGE_LOOK_M
     here = int(progress.station_m / STEP_M)
-    begin = max(here - int(BACK_M / STEP_M), 0)
+    begin = max(here - int(back / STEP_M), 0)
     end = min(here + int(reach / STEP_M) + 8, path.x.size)
     for row in range(CAR + 1, visible.seen[0]):
         dx, dy = visible.x[row] - visible.x[CAR], visible.y[row] - visible.y[CAR]
@@ -244,4 +258,4 @@ def look(
             note_person(sight, path, visible, seen, progress, times, numbers)
             continue
         note_hiding_place(sight, visible, seen, progress, numbers)
-        _note_vehicle(sight, visible, seen, progress, shift, ahead, numbers)
+        _note_vehicle(sight, path, visible, seen, progress, shift, ahead, numbers)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from agents.expert.actors import look
@@ -20,7 +22,7 @@ from agents.expert.sight import (
     REAR_OK,
     blank_sight,
 )
-from agents.expert.speed import cruise, forecast, stop_within
+from agents.expert.speed import NO_LIMIT_MPS2, cruise, forecast, stop_within
 from agents.expert.visible import CAR, Visible
 from di_envs.numerics.kernels import kernel
 from di_envs.world.dynamics import EgoParameters, pedals
@@ -28,6 +30,9 @@ from di_envs.world.dynamics import EgoParameters, pedals
 FORECAST_M = 100
 LONGEST_CHANGE_M = 45.0
 SHORTEST_CHANGE_M = 8.0
+NO_CHANGE_M = -1e6  # where the latest change began, if there was none
+QUICKEST_CHANGE_S = 1.7  # to a lane 3.5 m beside; quicker, and the car would be thrown aside
+HARDLY_BEGUN = 0.2  # share of a change's length within which the car is still on its lane
 BEFORE_CHANGE_S = 3.0  # gaps are looked for from this time before a change may begin
 STANDS_MPS, DRIVES_MPS = 0.1, 2.0
 MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls back
@@ -36,7 +41,7 @@ MAKE_ROOM_MPS2 = -1.0  # beside somebody whom it has to let pass, the car falls 
 @kernel
 def start_progress() -> Progress:
     """The memory at a path's start."""
-    return Progress(0.0, 0, 0.0, 1.0, 0, 0.0, 0.0, 0.0, 0.0)
+    return Progress(0.0, 0, NO_CHANGE_M, 1.0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -86,12 +91,50 @@ def change_due(path: DrivePath, progress: Progress, speed: float) -> float:
 
 
 @kernel
+def taken_back(progress: Progress, speed: float) -> Progress:
+    """The memory without a lane change that has hardly begun while the car is slow.
+
+    Somebody may have come meanwhile: whether the gap is free is to be asked again.
+    """
+    begun_m = progress.station_m - progress.change_begin_m
+    if speed > DRIVES_MPS or begun_m > HARDLY_BEGUN * progress.change_length_m:
+        return progress
+    return Progress(
+        progress.station_m,
+        progress.changes - 1,
+        NO_CHANGE_M,
+        progress.change_length_m,
+        progress.line,
+        progress.stood_s,
+        progress.waiting_s,
+        progress.still_s,
+        progress.yellow_s,
+    )
+
+
+@kernel
+def room_for_change(path: DrivePath, progress: Progress) -> float:
+    """Metres for the next lane change, if it began here and now; those behind it have as much."""
+    k = progress.changes
+    limit_m, left = path.change_limit_m[k], 0
+    while k < path.change_jump_m.size and path.change_jump_m[k] < limit_m:
+        left, k = left + 1, k + 1
+    begin_m = max(progress.station_m, path.change_jump_m[progress.changes])
+    return max((limit_m - CHANGE_END_M - begin_m) / left, SHORTEST_CHANGE_M)
+
+
+@kernel
 def begin_change(
     path: DrivePath, progress: Progress, speed: float, free: bool, numbers: ExpertNumbers
 ) -> Progress:
-    """Commits to the next lane change if its gap is free and its time has come."""
+    """Commits to the next lane change if its gap is free and its time has come.
+
+    Not while the car is too fast for the room that there is.
+    """
     k = progress.changes
-    if not free or progress.station_m < path.change_jump_m[k]:
+    room = room_for_change(path, progress)
+    too_fast = speed * QUICKEST_CHANGE_S > room
+    if not free or too_fast or progress.station_m < path.change_jump_m[k]:
         waiting = progress.waiting_s
         if not free:
             waiting += numbers.dt_s
@@ -106,11 +149,8 @@ def begin_change(
             progress.still_s,
             progress.yellow_s,
         )
-    room = path.change_limit_m[k] - CHANGE_END_M - progress.station_m
-    if k + 1 < path.change_jump_m.size and path.change_jump_m[k + 1] < path.change_limit_m[k]:
-        room -= CHANGE_ROOM_M
     wanted = min(max(numbers.change_time_s * speed, CHANGE_ROOM_M), LONGEST_CHANGE_M)
-    length = max(min(wanted, room), SHORTEST_CHANGE_M)
+    length = min(wanted, room)
     return Progress(
         progress.station_m,
         k + 1,
@@ -122,6 +162,24 @@ def begin_change(
         progress.still_s,
         progress.yellow_s,
     )
+
+
+@kernel
+def slow_for_changes(
+    path: DrivePath, progress: Progress, speed: float, numbers: ExpertNumbers
+) -> float:
+    """Acceleration so that the car is slow enough for the lane changes due, in their room."""
+    k = progress.changes
+    if k >= path.change_jump_m.size:
+        return NO_LIMIT_MPS2
+    ahead_m = max(path.change_jump_m[k] - progress.station_m, 0.0)
+    if ahead_m > BEFORE_CHANGE_S * speed:
+        return NO_LIMIT_MPS2
+    there = room_for_change(path, progress) / QUICKEST_CHANGE_S
+    allowed = math.sqrt(there * there + 2.0 * numbers.braking_mps2 * ahead_m)
+    if allowed > LONGEST_CHANGE_M / QUICKEST_CHANGE_S:
+        return NO_LIMIT_MPS2
+    return max((allowed - speed) / numbers.dt_s, -numbers.braking_mps2)
 
 
 @kernel
@@ -160,7 +218,8 @@ def decide(
     """
     x, y, yaw = visible.x[CAR], visible.y[CAR], visible.yaw[CAR]
     speed, half = visible.speed[CAR], visible.half_length[CAR]
-    progress = update_progress(path, progress, visible, numbers)
+    begun = update_progress(path, progress, visible, numbers)
+    progress = taken_back(begun, speed)
     times = np.empty(FORECAST_M)
     forecast(path, progress.station_m, speed, numbers, times)
     ahead = junction_ahead(path, progress, half)
@@ -169,10 +228,14 @@ def decide(
     if not numbers.ignore_actors:
         look(sight, path, progress, visible, shift, ahead, times, numbers)
     best = min(cruise(path, progress.station_m, speed, numbers), sight.number[BEST])
+    best = min(best, slow_for_changes(path, progress, speed, numbers))
     if shift != 0.0:
         beside = sight.number[REAR_OK] == 0.0
         free = sight.number[FRONT_OK] == 1.0 and not beside
+        was = progress.changes
         progress = begin_change(path, progress, speed, free, numbers)
+        if progress.changes > was and progress.changes == begun.changes:
+            progress = begun
         if not free:
             best = min(best, wait_for_gap(path, progress, speed, beside, numbers))
     queue = (sight.number[LEADER_REAR], sight.number[LEADER_SPEED])

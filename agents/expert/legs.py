@@ -52,10 +52,14 @@ def _steps_back(legs: list[Leg], lane: int, lane_m: float) -> bool:
 
 
 def join_legs(legs: list[Leg], lanes: Lanes) -> list[Leg]:
-    """Fills in lanes too short to have a route point, and stretches linked legs to their ends."""
+    """Fills in lanes without a route point, and stretches linked legs to their ends."""
     joined = [legs[0]]
     for leg in legs[1:]:
         joined.extend(Leg(lane, 0.0, 0.0) for lane in _skipped(lanes, joined[-1].lane, leg.lane))
+        beside = _changed_to(lanes, joined[-1].lane, leg.lane)
+        if beside >= 0:
+            end_m = float(lanes.length_m[beside])
+            joined.append(Leg(beside, end_m, end_m))
         joined.append(leg)
     for leg, following in pairwise(joined):
         if following.lane in _successors(lanes, leg.lane):
@@ -65,20 +69,49 @@ def join_legs(legs: list[Leg], lanes: Lanes) -> list[Leg]:
 
 
 def make_room(legs: list[Leg], lanes: Lanes) -> None:
-    """Moves lane changes that come late to an earlier place on the same lane."""
-    for i, (leg, following) in enumerate(pairwise(legs)):
-        if following.lane not in (lanes.left[leg.lane], lanes.right[leg.lane]):
-            continue
-        room, changes = 0.0, 0
-        for before, after in pairwise(legs[i:]):
-            if lanes.junction[after.lane] >= 0:
-                break
-            room += after.end_m - after.begin_m
-            changes += after.lane not in _successors(lanes, before.lane)
-        back = min(changes * WANTED_ROOM_M - room, leg.end_m - leg.begin_m - 1.0)
+    """Begins late lane changes earlier, on the lanes before too where one lane is too short."""
+    for i in range(len(legs) - 1):
+        if legs[i + 1].lane in _beside(lanes, legs[i].lane):
+            _begin_earlier(legs, i, lanes)
+
+
+def _begin_earlier(legs: list[Leg], i: int, lanes: Lanes) -> None:
+    """Makes room for the change from leg `i` to the next, as far as there is any before it."""
+    room, changes = 0.0, 0
+    for before, after in pairwise(legs[i:]):
+        if lanes.junction[after.lane] >= 0:
+            break
+        room += after.end_m - after.begin_m
+        changes += after.lane not in _successors(lanes, before.lane)
+    lacking = changes * WANTED_ROOM_M - room
+    while lacking > 0.0:
+        leg, following = legs[i], legs[i + 1]
+        back = min(lacking, leg.end_m - leg.begin_m - 1.0)
         if back > 0.0:
             leg.end_m -= back
             following.begin_m = max(following.begin_m - back, 0.0)
+            lacking -= back
+        beside = _beside_the_lane_before(legs, i, lanes)
+        if lacking <= 0.0 or beside < 0:
+            break
+        end_m = float(lanes.length_m[beside])
+        lacking -= following.begin_m
+        legs[i], following.begin_m = Leg(beside, end_m, end_m), 0.0
+        i -= 1
+
+
+def _beside_the_lane_before(legs: list[Leg], i: int, lanes: Lanes) -> int:
+    """The lane on which to come to the leg behind leg `i` from the leg before, or -1.
+
+    So that the change from leg `i`, which is used up, is made beside the leg before.
+    """
+    if i == 0 or legs[i].begin_m > 0.0 or lanes.junction[legs[i - 1].lane] >= 0:
+        return -1
+    if legs[i].lane not in _successors(lanes, legs[i - 1].lane):
+        return -1
+    left = lanes.left[legs[i].lane] == legs[i + 1].lane
+    beside = int((lanes.left if left else lanes.right)[legs[i - 1].lane])
+    return beside if beside >= 0 and legs[i + 1].lane in _successors(lanes, beside) else -1
 
 
 def linked_runs(legs: list[Leg], lanes: Lanes) -> list[list[Leg]]:
@@ -117,6 +150,22 @@ def _end_yaw(lanes: Lanes, lane: int) -> float:
 def _successors(lanes: Lanes, lane: int) -> list[int]:
     span = slice(lanes.successor_start[lane], lanes.successor_start[lane + 1])
     return [int(other) for other in lanes.successor[span]]
+
+
+def _beside(lanes: Lanes, lane: int) -> tuple[int, int]:
+    return int(lanes.left[lane]), int(lanes.right[lane])
+
+
+def _changed_to(lanes: Lanes, lane: int, target: int) -> int:
+    """The lane beside `lane` that alone leads to `target`, in a junction; -1 where none does.
+
+    Where a route changes lanes on the last metres before a junction, its next point is behind them.
+    """
+    if lanes.junction[target] < 0 or lanes.junction[lane] >= 0:
+        return -1
+    if target in _successors(lanes, lane):
+        return -1
+    return next((b for b in _beside(lanes, lane) if b >= 0 and target in _successors(lanes, b)), -1)
 
 
 def _skipped(lanes: Lanes, lane: int, target: int) -> list[int]:

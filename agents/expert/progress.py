@@ -47,6 +47,18 @@ def shift_at(path: DrivePath, progress: Progress, station_m: float) -> tuple[flo
 
 
 @kernel
+def lane_after_change(path: DrivePath, change: int, station_m: float) -> float:
+    """Offset of the lane to which a change leads from the base line, before and behind it too."""
+    value = 0.0
+    for k in range(path.change_jump_m.size):
+        if k <= change and station_m < path.change_jump_m[k]:
+            value -= path.change_shift_m[k]
+        elif k > change and station_m >= path.change_jump_m[k]:
+            value += path.change_shift_m[k]
+    return value
+
+
+@kernel
 def _point(path: DrivePath, progress: Progress, index: int) -> tuple[float, float]:
     """x, y of the path at a base point, shifted where a lane change is not yet made."""
     shift, _, _ = shift_at(path, progress, index * STEP_M)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes
-from di_envs.town.queries import project_to_lane
+from di_envs.town.queries import project_to_lane, width_at
 from di_envs.world.state import TICK_S, ActorKind, State
 from di_envs.world.traffic.car_following import (
     ACCELERATION_MPS2,
@@ -36,6 +36,7 @@ MIN_GAP_M = 2.0
 ROOM_TIME_S = 4.5  # a change must end before its lane does
 ROOM_M = 25.0
 LOOK_M = 100.0
+SIDE_M = 0.2  # of its new lane that a vehicle leaves free on either side
 
 _ABSENT = int(ActorKind.ABSENT)
 _CHANGE_LEFT, _CHANGE_RIGHT = 1, 2
@@ -75,10 +76,15 @@ def change_lanes(
 def _mobil(
     occupancy: Occupancy, state: State, lanes: Lanes, tables: TrafficTables, actor: int, target: int
 ) -> bool:
-    """Whether a change gains enough and is safe for the new follower and for the vehicle itself."""
+    """Whether a change gains enough and is safe for the new follower and for the vehicle itself.
+
+    A lane that only begins there, and is still too narrow, is none to change to.
+    """
     speed = state.speed[actor]
     half = state.half_length[actor]
     s, _ = project_to_lane(lanes, target, state.x[actor], state.y[actor])
+    if width_at(lanes, target, s) < 2.0 * (state.half_width[actor] + SIDE_M):
+        return False
     desired = allowed_speed(state, lanes, tables, actor)
     ahead = body_ahead(occupancy, target, actor, s)
     gap, ahead_speed = NO_LEADER_M, 0.0

@@ -17,6 +17,7 @@ from di_envs.world.traffic.tables import TrafficTables
 
 SPOT_SPACING_M = 12.0  # more than the longest vehicle with a gap
 END_MARGIN_M = 8.0  # free at both ends of a lane
+FULL_SHARE = 0.75  # of its greatest width, which a lane has where somebody may stand on it
 EGO_CLEARANCE_M = 15.0  # free around an ego's start, on all lanes
 ROUTE_CLEARANCE_M = 30.0  # free of vehicles at the beginning of an ego's route
 
@@ -117,11 +118,16 @@ def spawn_traffic(
 def _spots(
     lanes: Lanes, tables: TrafficTables, plans: tuple[RoutePlan, ...], seed: int
 ) -> list[tuple[int, float]]:
-    """Free places on lanes outside junctions, in an order drawn from the seed."""
+    """Free places on lanes outside junctions, in an order drawn from the seed.
+
+    None where a lane only begins: there it lies over the lane beside it.
+    """
     places = []
     for lane in np.flatnonzero((tables.usable == 1) & (lanes.junction < 0)):
         stations = np.arange(END_MARGIN_M, lanes.length_m[lane] - END_MARGIN_M, SPOT_SPACING_M)
-        places += [(int(lane), float(station)) for station in stations]
+        full = FULL_SHARE * lanes.width_m[lanes.first[lane] :][: lanes.count[lane]].max()
+        widths = lanes.width_m[lanes.first[lane] + (stations / lanes.spacing_m[lane]).astype(int)]
+        places += [(int(lane), float(station)) for station in stations[widths >= full]]
     xyz = np.array([_middle(lanes, lane, station) for lane, station in places]).reshape(-1, 3)
     free = np.ones(len(places), bool)
     for plan in plans:

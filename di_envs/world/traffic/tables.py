@@ -101,25 +101,30 @@ def _usable_lanes(town: Town) -> NDArray[np.int8]:
 def _open_ends(town: Town) -> NDArray[np.bool_]:
     """(L,) whether a road ends with this lane: neither it nor one beside it leads on."""
     lanes = town.lanes
-    ends = np.diff(lanes.successor_start) == 0
-    open_end = (lanes.kind == LaneKind.DRIVING) & ends & (lanes.junction < 0)
-    for lane in np.flatnonzero(open_end):
+    ends = _alone(town, np.diff(lanes.successor_start) == 0)
+    return (lanes.kind == LaneKind.DRIVING) & ends & (lanes.junction < 0)
+
+
+def _alone(town: Town, unlinked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(L,) whether neither a lane nor any beside it is linked: a road's end, no change of width."""
+    lanes, alone = town.lanes, unlinked.copy()
+    for lane in np.flatnonzero(unlinked):
         for side in (lanes.left, lanes.right):
             beside = int(side[lane])
             while beside >= 0:
-                open_end[lane] &= ends[beside]
+                alone[lane] &= unlinked[beside]
                 beside = int(side[beside])
-    return open_end
+    return alone
 
 
 def _entries(
     town: Town, usable: NDArray[np.int8]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Where lanes begin to which none leads; in towns without such, the middles of long lanes."""
+    """Where roads begin to which none leads; in towns without such, the middles of long lanes."""
     lanes = town.lanes
     roads = (usable == 1) & (lanes.junction < 0)
-    first = (np.diff(lanes.predecessor_start) == 0) & (lanes.length_m >= ENTRY_LANE_M)
-    entry = np.flatnonzero(roads & first)
+    first = _alone(town, np.diff(lanes.predecessor_start) == 0)
+    entry = np.flatnonzero(roads & first & (lanes.length_m >= ENTRY_LANE_M))
     station = np.full(entry.size, ENTRY_M)
     if entry.size == 0:
         entry = np.flatnonzero(roads & (lanes.length_m >= LONG_LANE_M))

@@ -24,6 +24,7 @@ SIDE_M = 0.5  # that walkers keep to the right of a line, where there is room to
 REACH_M = 1.25  # … from the line, up to which they go to pass each other …
 REACH_STEP_M = 0.25  # … and steps in which room for it is looked for
 SHORTEST_M = 3.0  # pieces of sidewalk that are worth walking
+LEAST_WALK_M = 20.0  # of sidewalks and crosswalks that lead to each other, for anybody to be there
 STEP_M = 0.5  # spacing of the lines made here
 FINE_M = 0.1  # steps in which the kerb is looked for
 ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
@@ -89,6 +90,7 @@ def build_walk_graph(town: Town) -> WalkGraph:
     edges = [_sidewalk(lanes, line) for line in _cut(pieces, ends)]
     edges += _links(lanes, [edge.line for edge in edges])
     edges += _crossings(lanes, crosswalks, pieces, ends)
+    edges = _without_islands(edges)
     return WalkGraph(
         **_edge_arrays(edges),
         **_next_edges([edge.line for edge in edges]),
@@ -97,6 +99,23 @@ def build_walk_graph(town: Town) -> WalkGraph:
         **_lights(lanes, crosswalks, town.signals),
         **_approaches(lanes, crosswalks),
     )
+
+
+def _without_islands(edges: list[_Edge]) -> list[_Edge]:
+    """The edges but those of short pieces that lead nowhere: a few on one would jam for ever."""
+    links = _next_edges([edge.line for edge in edges])
+    start, linked = links["next_start"], links["next_edge"]
+    walkable = np.zeros(len(edges))
+    for first in range(len(edges)):
+        island, front = {first}, [first]
+        while front and not walkable[first]:
+            at = front.pop()
+            ahead = set(linked[start[2 * at] : start[2 * at + 2]].tolist()) - island
+            island |= ahead
+            front += sorted(ahead)
+        if not walkable[first]:
+            walkable[sorted(island)] = sum(_length(edges[k].line) for k in sorted(island))
+    return [edge for edge, length in zip(edges, walkable, strict=True) if length >= LEAST_WALK_M]
 
 
 def _clear_sidewalks(lanes: Lanes) -> list[Line]:

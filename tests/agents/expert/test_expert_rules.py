@@ -297,6 +297,77 @@ def test_without_a_gap_it_stops_where_the_change_must_begin():
     assert drive.x < 88.5
 
 
+def test_it_does_not_change_lanes_before_one_who_comes_fast_from_far_behind():
+    """At 26 m/s he would have to brake by 4 m/s2 within the 85 m between them."""
+    actors = make_actors(1)
+    drive = Drive(make_path(change=(100.0, 188.0, 202.0, -3.5)), actors)
+    drive.place(150.0, 0.0)
+    actors.y[0] = -3.5
+    actors.x[1], actors.speed[1] = 60.0, 26.0
+    drive.step()
+    assert drive.progress.changes == 0
+
+
+def test_a_lane_change_that_it_only_stands_before_is_taken_back_when_somebody_comes():
+    actors = make_actors(1)
+    drive = Drive(make_path(line_m=57.0, change=(50.0, 88.0, 102.0, -3.5)), actors)
+    drive.place(53.0, 0.0)
+    actors.y[0] = -3.5
+    actors.light[0] = LightState.RED
+    drive.run(0.5)
+    actors.x[1] = drive.x  # he stands on the new lane, beside it
+    actors.light[0] = LightState.GREEN
+    drive.run(2.0)
+    assert drive.speed > 0.0
+    assert drive.progress.changes == 0
+
+
+def test_behind_a_change_it_sees_who_comes_on_the_lane_of_the_next():
+    """The path behind the car is still on the first of three lanes, y = -7, -3.5 and 0."""
+    path = make_path(change=(50.0, 70.0, 90.0, -3.5))
+    path = path._replace(
+        y=np.where(path.x < 50.0, -7.0, np.where(path.x < 90.0, -3.5, 0.0)),
+        change_jump_m=np.array([50.0, 90.0]),
+        change_latest_m=np.array([70.0, 138.0]),
+        change_limit_m=np.array([90.0, 152.0]),
+        change_shift_m=np.array([-3.5, -3.5]),
+    )
+    for behind_m, changes in ((25.0, 1), (60.0, 2)):
+        actors = make_actors(1)
+        drive = Drive(path, actors)
+        drive.place(95.0, 20.0)
+        drive.progress = drive.progress._replace(
+            changes=1, change_begin_m=60.0, change_length_m=30.0
+        )
+        actors.y[0] = -3.5
+        actors.x[1], actors.speed[1] = 95.0 - behind_m, 25.0
+        drive.step()
+        assert drive.progress.changes == changes
+
+
+def test_it_slows_down_for_a_lane_change_that_has_little_room():
+    """In 34 m it changes at 20 m/s at most, which is in 1.7 s."""
+    for speed, changes in ((25.0, 0), (19.9, 1)):
+        actors = make_actors()
+        drive = Drive(make_path(change=(50.0, 72.0, 86.0, -3.5), limit_mps=30.0), actors)
+        drive.place(50.0, speed)
+        actors.y[0] = -3.5
+        drive.step()
+        assert drive.progress.changes == changes
+        assert (drive.speed < speed) == (changes == 0)
+
+
+def test_beside_one_who_turns_as_it_does_it_goes_on():
+    """He shows where he turns, not that he comes over; on the road before he would come over."""
+    for junction, goes in (((100.0, 120.0), True), (None, False)):
+        actors = make_actors(1)
+        drive = Drive(make_path(junction=junction), actors)
+        drive.place(108.0, 0.0)
+        actors.x[1], actors.y[1], actors.yaw[1], actors.indicator[1] = 110.0, -3.5, 0.2, 1
+        drive.run(0.5)
+        assert (drive.speed > 0.5) == goes
+
+
 @settings(deadline=None, max_examples=30)
 @given(
     x=st.floats(1.0, 300.0),

@@ -148,17 +148,32 @@ def test_sidewalk_that_lies_on_driving_lanes_is_left_out():
     assert lengths == pytest.approx([47.5, 47.5], abs=0.51)
 
 
+def test_nobody_walks_where_the_whole_way_is_shorter_than_twenty_metres():
+    """Two pieces that meet count as one; a few people on a short one would jam for ever."""
+    walks = (((0, 9), (12, 9)), ((12, 9), (21, 9)), ((60, 9), (79, 9)))
+    lanes = make_lanes(
+        (
+            LaneSpec(start=(0, 0), end=(100, 0), road=0, lane_id=-1),
+            *(
+                LaneSpec(start=start, end=end, road=1 + k, lane_id=-1, kind=LaneKind.SIDEWALK)
+                for k, (start, end) in enumerate(walks)
+            ),
+        )
+    )
+    assert build_walk_graph(make_town(lanes)).length_m.tolist() == [12.0, 9.0]
+
+
 def test_sidewalk_ends_that_nearly_meet_are_joined():
     sidewalk = {"road": 0, "kind": LaneKind.SIDEWALK}
     lanes = make_lanes(
         (
             LaneSpec(start=(0, 0), end=(40, 0), lane_id=-1, **sidewalk),
             LaneSpec(start=(42, 0), end=(80, 0), lane_id=-2, **sidewalk),
-            LaneSpec(start=(84, 0), end=(99, 0), lane_id=-3, **sidewalk),
+            LaneSpec(start=(84, 0), end=(109, 0), lane_id=-3, **sidewalk),
         )
     )
     walk = build_walk_graph(make_town(lanes))
-    assert sorted(walk.length_m.round(6)) == [2.0, 15.0, 38.0, 40.0]
+    assert sorted(walk.length_m.round(6)) == [2.0, 25.0, 38.0, 40.0]
 
 
 def test_a_town_without_sidewalks_has_no_walkers():
