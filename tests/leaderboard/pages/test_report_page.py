@@ -17,7 +17,7 @@ from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.world.kinds import ActorKind
 from leaderboard.commands.cli import main
-from leaderboard.pages.report_page import ReportError, make_report, write_report
+from leaderboard.pages.report_page import ReportError, make_report, report_page, write_report
 from leaderboard.pages.town_svg import CLOSE_M, CM, line_path, simplified, town_svg
 from leaderboard.records.blocks import read_block
 from leaderboard.records.record import OUT_OF_TIME
@@ -223,6 +223,21 @@ def test_the_command_writes_the_page_beside_the_run_and_says_so(folder, capsys):
         said,
     )
     assert (folder / "report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_the_page_names_refused_routes_and_what_else_is_to_be_known(run, made):
+    run = dataclasses.replace(
+        run,
+        refused={"7": "Route '7': no way leads from keypoint 0 to keypoint 1 <here>"},
+        notes=("2 scenarios of type Ghost were left out",),
+    )
+    page = report_page(run, made[1], load_town("toy"))
+    notes = re.findall(r'<p class="note">(.*?)</p>', page)
+    assert (
+        "Route 7 could not be planned and is in no mean: "
+        "no way leads from keypoint 0 to keypoint 1 &lt;here&gt;"
+    ) in notes
+    assert "2 scenarios of type Ghost were left out" in notes
 
 
 def test_a_half_written_run_and_a_wrong_route_are_refused(folder, run, tmp_path, capsys):
