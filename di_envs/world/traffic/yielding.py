@@ -26,12 +26,17 @@ _LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
-def crosses_claim(occupancy: Occupancy, lanes: Lanes, way: int, actor: int) -> bool:
-    """Whether somebody is, or may come, before or in a place where `way` meets his lane."""
+def crosses_claim(
+    occupancy: Occupancy, lanes: Lanes, way: int, actor: int, passed_m: float
+) -> bool:
+    """Whether somebody is, or may come, before or in a place where `way` meets his lane.
+
+    Places that end before station `passed_m` of the way, where its rear is, do not count.
+    """
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
         other = lanes.conflict_lane[k]
         row = occupancy.claim[other]
-        if row < 0 or _same_approach(lanes, way, other):
+        if row < 0 or lanes.conflict_end_m[k] < passed_m or _same_approach(lanes, way, other):
             continue
         while row >= 0:
             if (
