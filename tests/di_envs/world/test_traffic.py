@@ -350,7 +350,7 @@ def test_who_stands_in_a_junction_behind_somebody_holds_no_way_until_he_drives_o
     with scene.edit() as state:
         state.grant[:2] = way
     held = []
-    for tick in range(160):
+    for _ in range(160):
         with scene.edit() as state:
             state.speed[1], state.lane_m[1] = 0.0, 10.0
         scene.world.advance(np.zeros((0, 3)))
