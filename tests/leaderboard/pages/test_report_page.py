@@ -16,13 +16,14 @@ from di_envs.drawing.outlines import BRIDGE_M
 from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.world.kinds import ActorKind
+from di_envs.world.struck import DOWN
 from leaderboard.commands.cli import main
 from leaderboard.pages.report_page import ReportError, make_report, report_page, write_report
 from leaderboard.pages.town_svg import CLOSE_M, CM, line_path, simplified, town_svg
 from leaderboard.records.blocks import read_block
 from leaderboard.records.record import OUT_OF_TIME
 from leaderboard.records.results import read_run, write_run
-from leaderboard.replaying.film import ABOVE, NEAR_M
+from leaderboard.replaying.film import ABOVE, LIES, NEAR_M
 from leaderboard.replaying.replay import replay, replay_env
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.runner import evaluate
@@ -112,7 +113,9 @@ def test_the_pages_positions_are_the_replays_to_a_centimetre(run, page):
             assert abs(columns["actor_x"][row] - state.x[actor]) < 0.0051
             assert abs(columns["actor_y"][row] - state.y[actor]) < 0.0051
             assert np.cos(columns["actor_yaw"][row] - state.yaw[actor]) > 1 - 1e-6
-            assert bool(int(columns["actor_flags"][row]) & ABOVE) == (state.z[actor] > BRIDGE_M)
+            flags = int(columns["actor_flags"][row])
+            assert bool(flags & ABOVE) == (state.z[actor] > BRIDGE_M)
+            assert bool(flags & LIES) == (state.walk_waiting[actor] == DOWN)
             assert meta["kinds"][int(columns["track_kind"][track])] == (
                 ActorKind(int(state.kind[actor])).name.lower()
             )
