@@ -43,6 +43,7 @@ REQUEST_BRAKING_MPS2 = 2.0  # a grant is asked for while one could still brake t
 GIVE_BACK_TICKS = round(5.0 / TICK_S)  # of standing still with a grant, then others have a turn
 WAITING_M = 30.0  # before a junction, where one counts as waiting for it
 OVER_LINE_M = 1.0  # as far as somebody may stand beyond the line at which he waits
+INSIDE = -1  # priority of who is in a junction, before all who come to it
 NEAR_M = 8.0  # who stands this close behind somebody stands because of him
 
 _EXIT, _AHEAD = 1, 2  # what shuts a way: no room behind it, or somebody on it
@@ -238,9 +239,9 @@ def _keep_or_give_back(
 def _rank(
     requests: Requests, state: State, lanes: Lanes, signals: Signals, actor: int, tick: int
 ) -> None:
-    """The turn of one who asks: by priority, then by arrival."""
+    """The turn of one who asks: by priority, then by arrival; who is in a junction comes first."""
     arrival = state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else tick
-    step, priority = requests.way_step[actor], 0  # of those who stand in a junction
+    step, priority = requests.way_step[actor], INSIDE
     if not is_over_junction(state, lanes, actor):
         approach, way = state.path[actor, step - 1], requests.way[actor]
         priority = priority_of(state, lanes, signals, approach, way, tick - arrival)
@@ -366,12 +367,12 @@ def _must_wait(
 
     Who stands in a junction already waits for nobody's turn, as he whose it is may wait for it.
     """
-    first = requests.way_step[actor]
-    for step in range(first, requests.way_end[actor] + 1):
+    inside = requests.rank[actor] < 0
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
         way = state.path[actor, step]
         if lanes.junction[way] < 0:
             continue
-        if first > 0 and _blocked_by_queue(requests, state, lanes, way, waiting):
+        if not inside and _blocked_by_queue(requests, state, lanes, way, waiting):
             return True
         passed_m = -NO_LEADER_M
         if step == 0:

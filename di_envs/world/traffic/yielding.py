@@ -271,7 +271,8 @@ def somebody_waits_between(
 ) -> bool:
     """Whether somebody is, or will come, between junctions that belong together, and stop there.
 
-    Who is short enough may wait where the vehicle itself could not.
+    Who is short enough may wait where the vehicle itself could not; who is behind it, on the lane
+    on which it stands, waits for it.
     """
     for step in range(first, last):
         lane = state.path[actor, step]
@@ -281,6 +282,8 @@ def somebody_waits_between(
             if other < egos:
                 if lanes.junction[lane] < 0:
                     return True
+            elif step == 0 and occupancy.rear_m[body] < state.lane_m[actor]:
+                pass
             elif other != actor and state.lane[other] == lane:
                 if _will_wait_on(state, lanes, other, actor, first, last):
                     return True
