@@ -31,7 +31,7 @@ from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.occupancy import Occupancy, claim_ahead
 from di_envs.world.traffic.speed_choice import Leaders
 from di_envs.world.traffic.yielding import (
-    crosses_claim,
+    crossing_claimant,
     ego_in_the_way,
     exit_has_room,
     room_before_ego,
@@ -302,7 +302,11 @@ def give_grants(
         if _meets_ego(requests, state, lanes, signals, egos, actor):
             requests.shut[actor] = _AHEAD
             continue
-        if _must_wait(requests, occupancy, state, lanes, actor, waiting):
+        met = _whom_it_meets(requests, occupancy, state, lanes, actor)
+        if met >= 0 and state.still_ticks[met] > GIVE_BACK_TICKS:
+            requests.shut[actor] = _AHEAD
+            continue
+        if met >= 0 or _waits_its_turn(requests, state, lanes, actor, waiting):
             requests.queue[waiting] = actor
             waiting += 1
             continue
@@ -360,24 +364,40 @@ def _meets_ego(
 
 
 @kernel
-def _must_wait(
-    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int, waiting: int
-) -> bool:
-    """Whether others come first, on any of the junction lanes that a vehicle asks for.
+def _whom_it_meets(
+    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int
+) -> int:
+    """Who has a claim that crosses a lane for which a vehicle asks, or -1; first who stands.
 
-    Who stands in a junction already waits for nobody's turn, as he whose it is may wait for it.
+    Who waits for one that stands keeps nobody from going first: that one may wait for them.
     """
-    inside = requests.rank[actor] < 0
+    met = -1
     for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
         way = state.path[actor, step]
         if lanes.junction[way] < 0:
             continue
-        if not inside and _blocked_by_queue(requests, state, lanes, way, waiting):
-            return True
         passed_m = -NO_LEADER_M
         if step == 0:
             passed_m = state.lane_m[actor] - state.half_length[actor]
-        if crosses_claim(occupancy, lanes, way, actor, passed_m):
+        other = crossing_claimant(occupancy, state, lanes, way, actor, passed_m)
+        if other >= 0 and (met < 0 or state.still_ticks[other] > state.still_ticks[met]):
+            met = other
+    return met
+
+
+@kernel
+def _waits_its_turn(
+    requests: Requests, state: State, lanes: Lanes, actor: int, waiting: int
+) -> bool:
+    """Whether others come first on any of the junction lanes that a vehicle asks for.
+
+    Who stands in a junction already waits for nobody's turn, as he whose it is may wait for it.
+    """
+    if requests.rank[actor] < 0:
+        return False
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+        way = state.path[actor, step]
+        if lanes.junction[way] >= 0 and _blocked_by_queue(requests, state, lanes, way, waiting):
             return True
     return False
 

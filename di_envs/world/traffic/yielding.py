@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import pose_at, project_to_lane
@@ -26,27 +27,31 @@ _LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
-def crosses_claim(
-    occupancy: Occupancy, lanes: Lanes, way: int, actor: int, passed_m: float
-) -> bool:
-    """Whether somebody is, or may come, before or in a place where `way` meets his lane.
+def crossing_claimant(
+    occupancy: Occupancy, state: State, lanes: Lanes, way: int, actor: int, passed_m: float
+) -> int:
+    """Who is, or may come, before or in a place where `way` meets his lane; -1 for nobody.
 
-    Places that end before station `passed_m` of the way, where its rear is, do not count.
+    Of several the one who has stood longest. Places that end before station `passed_m` of the way,
+    where the vehicle's rear is, do not count.
     """
+    met = -1
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
         other = lanes.conflict_lane[k]
         row = occupancy.claim[other]
         if row < 0 or lanes.conflict_end_m[k] < passed_m or _same_approach(lanes, way, other):
             continue
         while row >= 0:
+            who = occupancy.claimant[row]
             if (
-                occupancy.claimant[row] != actor
+                who != actor
                 and occupancy.claim_rear_m[row] < lanes.conflict_other_end_m[k]
                 and occupancy.claim_front_m[row] > lanes.conflict_other_begin_m[k]
+                and (met < 0 or state.still_ticks[who] > state.still_ticks[met])
             ):
-                return True
+                met = who
             row = occupancy.next_claim[row]
-    return False
+    return as_int64(met)
 
 
 @kernel
