@@ -20,6 +20,7 @@ from di_envs.sensors.scene.tags import TAG_BITS, Tag
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import State
+from di_envs.world.struck import footprint
 from di_envs.world.world import WorldView
 
 SAMPLES = 4  # places looked at along each side of a cell
@@ -99,13 +100,8 @@ def _actors(state: State, pose: Float64, sides: Float64, out: UInt8) -> None:
         if kind == _ABSENT or kind >= _PROP or abs(state.z[actor] - pose[2]) > LEVEL_M:
             continue
         class_ = _WALKER_CLASS if kind == _WALKER else _VEHICLE
-        box = Rectangle(
-            state.x[actor],
-            state.y[actor],
-            state.yaw[actor],
-            state.half_length[actor],
-            state.half_width[actor],
-        )
+        half_length, half_width = footprint(state, actor)
+        box = Rectangle(state.x[actor], state.y[actor], state.yaw[actor], half_length, half_width)
         _box(box, pose, sides, class_, out)
 
 

@@ -28,12 +28,12 @@ from di_envs.world.world import WorldView
 
 FRAME_S = 0.5
 REACH_M = 120.0  # up to which actors are kept
-FORMAT = 1
+FORMAT = 2
 
 # What is kept of actors; of egos, lights and the clock all is.
 ACTOR_FIELDS = (
     *("kind", "x", "y", "z", "yaw", "speed", "acceleration", "yaw_rate"),
-    *("half_length", "half_width", "height", "brake_light", "indicator"),
+    *("half_length", "half_width", "height", "brake_light", "indicator", "walk_waiting"),
 )
 
 

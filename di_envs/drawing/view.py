@@ -33,6 +33,7 @@ from di_envs.observer import Observer
 from di_envs.reward import standing_of
 from di_envs.world.event_names import EVENT_NAMES, event_of_key
 from di_envs.world.kinds import ActorKind, EventKind
+from di_envs.world.struck import DOWN, footprint
 from di_envs.world.world import WorldView
 
 WIDTH_PX, HEIGHT_PX = 960, 640
@@ -248,10 +249,10 @@ class _Pen:
             self._actor(state, ego, pixels[ego], EGO)
 
     def _actor(self, state: Any, actor: int, pixel: Array, colour: str) -> None:
-        if state.kind[actor] == ActorKind.WALKER:
+        if state.kind[actor] == ActorKind.WALKER and state.walk_waiting[actor] != DOWN:
             self._disc(pixel, 0.45, colour, EDGE)
             return
-        half_length, half_width = state.half_length[actor], state.half_width[actor]
+        half_length, half_width = footprint(state, actor)
         outline = box(0.0, 0.0, state.yaw[actor], half_length, half_width) * self._scale + pixel
         self._pen.polygon(outline.ravel().tolist(), colour, EDGE, 2)
         if state.brake_light[actor]:

@@ -27,6 +27,20 @@ def falls(kind: int) -> bool:
 
 
 @kernel
+def footprint(state: State, actor: int) -> tuple[float, float]:
+    """Half length and half width of an actor from above [m].
+
+    Who was knocked down lies: people along their heading, two wheels on their right side.
+    """
+    length, width = state.half_length[actor], state.half_width[actor]
+    if state.walk_waiting[actor] != DOWN:
+        return length, width
+    if state.kind[actor] == LAST_WHO_FALLS:
+        return 0.5 * state.height[actor], width
+    return length, 0.5 * state.height[actor]
+
+
+@kernel
 def strike(state: State, actor: int) -> None:
     """Notes that an actor was hit, which begins what becomes of it."""
     if falls(state.kind[actor]):

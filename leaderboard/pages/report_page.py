@@ -136,6 +136,10 @@ def _notes(run: RunRecord, films: Sequence[RouteFilm]) -> Iterator[str]:
     done = dict.fromkeys(text for film in films for text in film.record.interventions)
     if done:
         yield f"With what was done to the world, or to what the agent saw: {'; '.join(done)}."
+    for route_id, why in run.refused.items():
+        reason = why.removeprefix(f"Route '{route_id}': ")
+        yield f"Route {route_id} could not be planned and is in no mean: {reason}"
+    yield from run.notes
     lost = sum(film.record.lost for film in films)
     if lost:
         yield (

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from di_envs.drawing.outlines import BRIDGE_M
 from di_envs.town.plan import RoutePlan
 from di_envs.world.kinds import ActorKind
+from di_envs.world.struck import DOWN
 from leaderboard.records.blocks import Column
 from leaderboard.replaying.replay import ReplayStep
 
@@ -25,7 +26,7 @@ METRE_STEP, ANGLE_STEP, SHARE_STEP, SPEED_STEP = 0.01, 0.001, 0.001, 0.01
 PERCENT_STEP = 0.01
 
 # Bits of an actor's flags
-ABOVE, BRAKES, LEFT, RIGHT = 1, 2, 4, 8
+ABOVE, BRAKES, LEFT, RIGHT, LIES = 1, 2, 4, 8, 16
 
 _EGO = ("x", "y", "yaw", "speed")
 # The columns with a number a moment, in the order of `Film.add`, and their steps
@@ -179,4 +180,5 @@ def _flags(state: Any, who: NDArray[np.int64]) -> NDArray[np.int64]:
     flags = np.where(state.z[who] > BRIDGE_M, ABOVE, 0)
     flags += np.where(state.brake_light[who] != 0, BRAKES, 0)
     flags += np.where(state.indicator[who] < 0, LEFT, 0)
-    return flags + np.where(state.indicator[who] > 0, RIGHT, 0)
+    flags += np.where(state.indicator[who] > 0, RIGHT, 0)
+    return flags + np.where(state.walk_waiting[who] == DOWN, LIES, 0)

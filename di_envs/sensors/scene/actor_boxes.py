@@ -1,4 +1,7 @@
-"""Actors as boxes: the parts of each, put in their place and coloured; its lamps lit or dark."""
+"""Actors as boxes: the parts of each, put in their place and coloured; its lamps lit or dark.
+
+Who was knocked down lies: people on their faces, their heads ahead; two wheels on their right side.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,15 @@ from di_envs.sensors.scene.actor_parts import (
     Role,
 )
 from di_envs.sensors.scene.boxes import Boxes, Material
+from di_envs.world.kinds import ActorKind
 from di_envs.world.state import State
+from di_envs.world.struck import DOWN
 
 DETAIL_M = 60.0  # beyond which only the large parts are drawn
 _BLINK_TICKS = 8  # that an indicator is lit, and then dark
 _VEHICLE_COLOUR = int(Stream.VEHICLE_COLOUR)
 _BODY, _TAIL, _LEFT, _RIGHT = int(Role.BODY), int(Role.TAIL), int(Role.LEFT), int(Role.RIGHT)
+_WALKER = int(ActorKind.WALKER)
 _PLAIN, _LAMP = int(Material.PLAIN), int(Material.LAMP)
 _DARK, _BRAKING, _BLINKING = range(3)  # what shines in a part
 
@@ -76,14 +82,25 @@ def _place_part(
     state: State, actor: int, parts: Parts, part: int, c: float, s: float, out: Boxes, at: int
 ) -> None:
     """Writes where box `at` is and how large; c and s are of the actor's yaw."""
-    along = parts.at[part, 0] * state.half_length[actor]
-    across = parts.at[part, 1] * state.half_width[actor]
+    sizes = (state.half_length[actor], state.half_width[actor], state.height[actor])
+    along, across, up = (
+        parts.at[part, 0] * sizes[0],
+        parts.at[part, 1] * sizes[1],
+        parts.at[part, 2] * sizes[2],
+    )
+    for axis in range(3):
+        out.half[at, axis] = parts.half[part, axis] * sizes[axis]
+    if state.walk_waiting[actor] == DOWN:
+        if state.kind[actor] == _WALKER:
+            along, up = up - 0.5 * sizes[2], sizes[0] - along
+            down = 0
+        else:
+            across, up = up - 0.5 * sizes[2], sizes[1] - across
+            down = 1
+        out.half[at, 2], out.half[at, down] = out.half[at, down], out.half[at, 2]
     out.centre[at, 0] = state.x[actor] + c * along - s * across
     out.centre[at, 1] = state.y[actor] + s * along + c * across
-    out.centre[at, 2] = state.z[actor] + parts.at[part, 2] * state.height[actor]
-    out.half[at, 0] = parts.half[part, 0] * state.half_length[actor]
-    out.half[at, 1] = parts.half[part, 1] * state.half_width[actor]
-    out.half[at, 2] = parts.half[part, 2] * state.height[actor]
+    out.centre[at, 2] = state.z[actor] + up
     out.yaw[at] = state.yaw[actor]
     out.pitch[at] = 0.0
 

@@ -15,6 +15,7 @@ from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, SignalKind, Signals
 from di_envs.world.state import PATH_LANES, TICK_S, ActorKind, State
 from di_envs.world.traffic.approach import (
+    MOVING_MPS,
     PATIENCE_TICKS,
     Requests,
     can_stop,
@@ -30,7 +31,7 @@ from di_envs.world.traffic.car_following import NO_LEADER_M
 from di_envs.world.traffic.occupancy import Occupancy, claim_ahead
 from di_envs.world.traffic.speed_choice import Leaders
 from di_envs.world.traffic.yielding import (
-    crosses_claim,
+    crossing_claimant,
     ego_in_the_way,
     exit_has_room,
     room_before_ego,
@@ -42,7 +43,8 @@ REQUEST_BRAKING_MPS2 = 2.0  # a grant is asked for while one could still brake t
 GIVE_BACK_TICKS = round(5.0 / TICK_S)  # of standing still with a grant, then others have a turn
 WAITING_M = 30.0  # before a junction, where one counts as waiting for it
 OVER_LINE_M = 1.0  # as far as somebody may stand beyond the line at which he waits
-NEAR_EGO_M = 8.0  # who stands this close behind an ego stands because of it
+INSIDE = -1  # priority of who is in a junction, before all who come to it
+NEAR_M = 8.0  # who stands this close behind somebody stands because of him
 
 _EXIT, _AHEAD = 1, 2  # what shuts a way: no room behind it, or somebody on it
 _ABSENT = int(ActorKind.ABSENT)
@@ -123,24 +125,29 @@ def _give_back(state: State, actor: int) -> None:
 def _give_back_inside(
     requests: Requests, state: State, lanes: Lanes, ahead: Leaders, egos: int, actor: int
 ) -> bool:
-    """Who stands in a junction for an ego gives its grant back, or both would wait for ever.
+    """Who stands in a junction behind somebody, or for an ego, gives its grant back.
 
-    Notes too how far a vehicle with a grant may go for the sake of egos that are in its way.
+    Else both would wait for ever if he waits for the way that it holds. Notes too how far a
+    vehicle with a grant may go for the sake of egos that are in its way.
     """
     if state.grant[actor] < 0:
         return False
     requests.line_m[actor] = room_before_ego(state, lanes, egos, actor)
     if lanes.junction[state.lane[actor]] < 0 or not _stands_with_grant(state, actor):
         return False
-    if requests.line_m[actor] > NEAR_EGO_M and not _is_behind_ego(ahead, egos, actor):
+    if requests.line_m[actor] > NEAR_M and not _is_behind_anybody(ahead, egos, actor):
         return False
     _give_back(state, actor)
     return True
 
 
 @kernel
-def _is_behind_ego(ahead: Leaders, egos: int, actor: int) -> bool:
-    return 0 <= ahead.actor[actor] < egos and ahead.gap_m[actor] < NEAR_EGO_M
+def _is_behind_anybody(ahead: Leaders, egos: int, actor: int) -> bool:
+    """Whether an ego, or a vehicle that stands, is close before a vehicle."""
+    leader = ahead.actor[actor]
+    if leader < 0 or ahead.gap_m[actor] >= NEAR_M:
+        return False
+    return leader < egos or ahead.speed[actor] < MOVING_MPS
 
 
 @kernel
@@ -154,7 +161,7 @@ def _ask_inside(
     requests.way_end[actor] = run_end(state, lanes, actor, 0)
     if state.arrival_tick[actor] < 0:
         state.arrival_tick[actor] = state.tick[()]
-    return not _is_behind_ego(ahead, egos, actor)
+    return not _is_behind_anybody(ahead, egos, actor)
 
 
 @kernel
@@ -202,7 +209,7 @@ def _keep_or_give_back(
 ) -> None:
     """A grant for the junction ahead is taken back at yellow, and where it cannot be used.
 
-    Who is already on its way through a junction that belongs to this one keeps that one's.
+    Who is already on its way through a junction that belongs to this one keeps that one's alone.
     """
     speed = state.speed[actor]
     inside = is_over_junction(state, lanes, actor)
@@ -218,19 +225,24 @@ def _keep_or_give_back(
     if _stands_with_grant(state, actor) or _waits_behind(
         requests, state, lanes, ahead, actor, distance
     ):
-        if not inside and can_stop(speed, distance, 0.0):
+        if not can_stop(speed, distance, 0.0):
+            return
+        if not inside:
             requests.line_m[actor] = distance
             _give_back(state, actor)
             state.arrival_tick[actor] = state.tick[()]
+        elif _stands_with_grant(state, actor) and ahead.gap_m[actor] < NEAR_M:
+            requests.line_m[actor] = min(distance, requests.line_m[actor])
+            state.grant_steps[actor] = step - 1
 
 
 @kernel
 def _rank(
     requests: Requests, state: State, lanes: Lanes, signals: Signals, actor: int, tick: int
 ) -> None:
-    """The turn of one who asks: by priority, then by arrival."""
+    """The turn of one who asks: by priority, then by arrival; who is in a junction comes first."""
     arrival = state.arrival_tick[actor] if state.arrival_tick[actor] >= 0 else tick
-    step, priority = requests.way_step[actor], 0  # of those who stand in a junction
+    step, priority = requests.way_step[actor], INSIDE
     if not is_over_junction(state, lanes, actor):
         approach, way = state.path[actor, step - 1], requests.way[actor]
         priority = priority_of(state, lanes, signals, approach, way, tick - arrival)
@@ -291,7 +303,11 @@ def give_grants(
         if _meets_ego(requests, state, lanes, signals, egos, actor):
             requests.shut[actor] = _AHEAD
             continue
-        if _must_wait(requests, occupancy, state, lanes, actor, waiting):
+        met = _whom_it_meets(requests, occupancy, state, lanes, actor)
+        if met >= 0 and state.still_ticks[met] > GIVE_BACK_TICKS:
+            requests.shut[actor] = _AHEAD
+            continue
+        if met >= 0 or _waits_its_turn(requests, state, lanes, actor, waiting):
             requests.queue[waiting] = actor
             waiting += 1
             continue
@@ -349,17 +365,41 @@ def _meets_ego(
 
 
 @kernel
-def _must_wait(
-    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int, waiting: int
-) -> bool:
-    """Whether others come first, on any of the junction lanes that a vehicle asks for."""
+def _whom_it_meets(
+    requests: Requests, occupancy: Occupancy, state: State, lanes: Lanes, actor: int
+) -> int:
+    """Who has a claim that crosses a lane for which a vehicle asks, or -1; first who stands.
+
+    Who waits for one that stands keeps nobody from going first: that one may wait for them.
+    """
+    met = -1
     for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
         way = state.path[actor, step]
-        if lanes.junction[way] >= 0:
-            if _blocked_by_queue(requests, state, lanes, way, waiting) or crosses_claim(
-                occupancy, lanes, way, actor
-            ):
-                return True
+        if lanes.junction[way] < 0:
+            continue
+        passed_m = -NO_LEADER_M
+        if step == 0:
+            passed_m = state.lane_m[actor] - state.half_length[actor]
+        other = crossing_claimant(occupancy, state, lanes, way, actor, passed_m)
+        if other >= 0 and (met < 0 or state.still_ticks[other] > state.still_ticks[met]):
+            met = other
+    return met
+
+
+@kernel
+def _waits_its_turn(
+    requests: Requests, state: State, lanes: Lanes, actor: int, waiting: int
+) -> bool:
+    """Whether others come first on any of the junction lanes that a vehicle asks for.
+
+    Who stands in a junction already waits for nobody's turn, as he whose it is may wait for it.
+    """
+    if requests.rank[actor] < 0:
+        return False
+    for step in range(requests.way_step[actor], requests.way_end[actor] + 1):
+        way = state.path[actor, step]
+        if lanes.junction[way] >= 0 and _blocked_by_queue(requests, state, lanes, way, waiting):
+            return True
     return False
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import pose_at, project_to_lane
@@ -26,22 +27,31 @@ _LIGHT = int(SignalKind.LIGHT)
 
 
 @kernel
-def crosses_claim(occupancy: Occupancy, lanes: Lanes, way: int, actor: int) -> bool:
-    """Whether somebody is, or may come, before or in a place where `way` meets his lane."""
+def crossing_claimant(
+    occupancy: Occupancy, state: State, lanes: Lanes, way: int, actor: int, passed_m: float
+) -> int:
+    """Who is, or may come, before or in a place where `way` meets his lane; -1 for nobody.
+
+    Of several the one who has stood longest. Places that end before station `passed_m` of the way,
+    where the vehicle's rear is, do not count.
+    """
+    met = -1
     for k in range(lanes.conflict_start[way], lanes.conflict_start[way + 1]):
         other = lanes.conflict_lane[k]
         row = occupancy.claim[other]
-        if row < 0 or _same_approach(lanes, way, other):
+        if row < 0 or lanes.conflict_end_m[k] < passed_m or _same_approach(lanes, way, other):
             continue
         while row >= 0:
+            who = occupancy.claimant[row]
             if (
-                occupancy.claimant[row] != actor
+                who != actor
                 and occupancy.claim_rear_m[row] < lanes.conflict_other_end_m[k]
                 and occupancy.claim_front_m[row] > lanes.conflict_other_begin_m[k]
+                and (met < 0 or state.still_ticks[who] > state.still_ticks[met])
             ):
-                return True
+                met = who
             row = occupancy.next_claim[row]
-    return False
+    return as_int64(met)
 
 
 @kernel
@@ -280,7 +290,8 @@ def somebody_waits_between(
 ) -> bool:
     """Whether somebody is, or will come, between junctions that belong together, and stop there.
 
-    Who is short enough may wait where the vehicle itself could not.
+    Who is short enough may wait where the vehicle itself could not; who is behind it, on the lane
+    on which it stands, waits for it.
     """
     for step in range(first, last):
         lane = state.path[actor, step]
@@ -290,6 +301,8 @@ def somebody_waits_between(
             if other < egos:
                 if lanes.junction[lane] < 0:
                     return True
+            elif step == 0 and occupancy.rear_m[body] < state.lane_m[actor]:
+                pass
             elif other != actor and state.lane[other] == lane:
                 if _will_wait_on(state, lanes, other, actor, first, last):
                     return True

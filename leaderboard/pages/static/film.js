@@ -6,7 +6,7 @@
 // di.film.kmh(metres_a_second): as people read it
 
 (function (di) {
-  const ABOVE = 1, BRAKES = 2, LEFT = 4, RIGHT = 8; // bits of an actor's flags
+  const ABOVE = 1, BRAKES = 2, LEFT = 4, RIGHT = 8, LIES = 16; // bits of an actor's flags
   const JUMP_M = 4; // who is that much further a moment later was set down there: no way between
 
   function of({ meta, columns }) {
@@ -146,5 +146,5 @@
     return `${(tenths / 10).toFixed(1)} km/h`;
   }
 
-  di.film = { of, kmh, ABOVE, BRAKES, LEFT, RIGHT };
+  di.film = { of, kmh, ABOVE, BRAKES, LEFT, RIGHT, LIES };
 })((globalThis.driveinsight ??= {}));

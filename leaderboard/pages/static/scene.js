@@ -8,7 +8,8 @@
 //   streets and above all, and one that says whether the route is drawn
 
 (function (di) {
-  const { ABOVE, BRAKES, LEFT, RIGHT } = di.film;
+  const { ABOVE, BRAKES, LEFT, RIGHT, LIES } = di.film;
+  const HALF_HEIGHT = 0.85; // of people, and of two wheels with their riders, as they lie [m]
   const LINES = { solid: [18, []], broken: [18, [200, 200]], rim: [90, []] };
   const SEAM = 12; // surfaces reach that much over their edge, so that none shows between two
   const ACTORS = ["car", "van", "truck", "bus", "motorcycle", "bicycle", "walker"];
@@ -127,11 +128,13 @@
 
   function body(context, actor, camera, look, time_s) {
     const fill = look[actor.kind] ?? look.car;
-    if (actor.kind === "walker") {
+    const walks = actor.kind === "walker", lies = actor.flags & LIES;
+    if (walks && !lies) {
       disc(context, actor.x, actor.y, Math.max(0.45, 3 / camera.scale), fill, look.edge);
       return;
     }
-    const { half_length: l, half_width: w } = actor;
+    const l = walks ? HALF_HEIGHT : actor.half_length;
+    const w = lies && !walks ? HALF_HEIGHT : actor.half_width;
     context.save();
     context.translate(actor.x, actor.y);
     context.rotate(actor.yaw);

@@ -16,6 +16,7 @@ from di_envs.sensors.scene.tags import PALETTE, Tag
 from di_envs.town.lanes import LaneKind, LightState
 from di_envs.town.loading import load_town
 from di_envs.world.state import ActorKind, views_of
+from di_envs.world.struck import DOWN, footprint
 from di_envs.world.world import World, WorldConfig
 
 
@@ -305,3 +306,31 @@ def test_props_of_scenarios_fill_their_boxes_and_carry_carlas_tags(world, scene,
     np.testing.assert_allclose(high[:2], middle + reach, atol=0.25)
     assert low[2] == pytest.approx(0.25, abs=0.01)
     assert high[2] == pytest.approx(0.25 + size[2], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "lying"),
+    [
+        (ActorKind.WALKER, (0.25, 0.3, 1.8), (0.9, 0.3, 0.5)),  # along its heading
+        (ActorKind.BICYCLE, (0.9, 0.3, 1.6), (0.9, 0.8, 0.6)),  # on its side
+    ],
+)
+def test_who_was_knocked_down_lies(world, scene, kind, size, lying):
+    snapshot = world.save()
+    state = views_of(snapshot.record)
+    who = int(np.flatnonzero(state.kind == ActorKind.CAR)[-1])
+    state.x[who], state.y[who], state.z[who] = state.x[0] + 10.0, state.y[0], 0.25
+    state.yaw[who], state.kind[who] = 0.0, kind
+    state.half_length[who], state.half_width[who], state.height[who] = size
+    state.walk_waiting[who] = DOWN
+    world.restore(snapshot)
+    boxes = collected(world, scene)
+    rows = np.flatnonzero(boxes.instance[: boxes.count[0]] == who + 1)
+    centre, half = boxes.centre[rows], boxes.half[rows]
+    low, high = (centre - half).min(axis=0), (centre + half).max(axis=0)
+    assert footprint(state, who) == pytest.approx(lying[:2])
+    middle, reach = np.array([state.x[who], state.y[who]]), np.array(lying[:2])
+    np.testing.assert_allclose(low[:2], middle - reach, atol=0.15)
+    np.testing.assert_allclose(high[:2], middle + reach, atol=0.15)
+    assert low[2] >= 0.25 - 0.01
+    assert high[2] == pytest.approx(0.25 + lying[2], abs=0.15)

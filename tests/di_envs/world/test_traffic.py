@@ -341,6 +341,28 @@ def test_a_car_that_gets_its_next_grant_does_not_hide_others_who_hold_its_last_o
     assert scene.state.grant.tolist()[:2] == [-1, shared]
 
 
+def test_who_stands_in_a_junction_behind_somebody_holds_no_way_until_he_drives_on():
+    """Both are on their way through from the west; after five seconds it is no reservation."""
+    scene = ToyScene(vehicles=2)
+    way = scene.lane(FROM_WEST_STRAIGHT)
+    length = scene.room(FROM_WEST_STRAIGHT)
+    scene.put(0, [FROM_WEST_STRAIGHT], length - 5.0)
+    scene.put(1, [FROM_WEST_STRAIGHT], length - 12.0)
+    with scene.edit() as state:
+        state.grant[:2] = way
+    held = []
+    for _ in range(160):
+        with scene.edit() as state:
+            state.speed[1], state.lane_m[1] = 0.0, 10.0
+        scene.world.advance(np.zeros((0, 3)))
+        held.append(int(scene.state.grant[0]))
+    assert held[60] == way
+    assert held[-1] == -1
+    for _ in scene.run(15.0):
+        pass
+    assert way not in scene.state.path[:2, 0]
+
+
 # walkers
 
 

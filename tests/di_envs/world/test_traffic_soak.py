@@ -142,3 +142,17 @@ def test_traffic_gets_through_junctions_that_follow_each_other_at_once(shared: P
         world.advance(np.zeros((0, 3)), 20)
         longest = max(longest, int(world.view.state.still_ticks[:VEHICLES].max()))
     assert longest * TICK_S <= 180.0
+
+
+def test_nobody_waits_for_ever_where_town04_is_full(shared: Path) -> None:
+    """A lorry that a red light stopped between two junctions met whom it had let in behind it."""
+    world = World(
+        load_town(shared / "data" / "xodr" / "Town04_2020.xodr"),
+        WorldConfig(vehicles=200, walkers=60),
+    )
+    world.reset(5, ())
+    state, longest = world.view.state, 0
+    for _ in range(60 * 28):
+        world.advance(np.zeros((0, 3)), 20)
+        longest = max(longest, int(state.still_ticks[:200].max()))
+    assert longest * TICK_S < 240.0  # three rounds of the lights of three junctions in a row

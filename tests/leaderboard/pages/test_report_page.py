@@ -16,13 +16,14 @@ from di_envs.drawing.outlines import BRIDGE_M
 from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from di_envs.world.kinds import ActorKind
+from di_envs.world.struck import DOWN
 from leaderboard.commands.cli import main
-from leaderboard.pages.report_page import ReportError, make_report, write_report
+from leaderboard.pages.report_page import ReportError, make_report, report_page, write_report
 from leaderboard.pages.town_svg import CLOSE_M, CM, line_path, simplified, town_svg
 from leaderboard.records.blocks import read_block
 from leaderboard.records.record import OUT_OF_TIME
 from leaderboard.records.results import read_run, write_run
-from leaderboard.replaying.film import ABOVE, NEAR_M
+from leaderboard.replaying.film import ABOVE, LIES, NEAR_M
 from leaderboard.replaying.replay import replay, replay_env
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.runner import evaluate
@@ -112,7 +113,9 @@ def test_the_pages_positions_are_the_replays_to_a_centimetre(run, page):
             assert abs(columns["actor_x"][row] - state.x[actor]) < 0.0051
             assert abs(columns["actor_y"][row] - state.y[actor]) < 0.0051
             assert np.cos(columns["actor_yaw"][row] - state.yaw[actor]) > 1 - 1e-6
-            assert bool(int(columns["actor_flags"][row]) & ABOVE) == (state.z[actor] > BRIDGE_M)
+            flags = int(columns["actor_flags"][row])
+            assert bool(flags & ABOVE) == (state.z[actor] > BRIDGE_M)
+            assert bool(flags & LIES) == (state.walk_waiting[actor] == DOWN)
             assert meta["kinds"][int(columns["track_kind"][track])] == (
                 ActorKind(int(state.kind[actor])).name.lower()
             )
@@ -223,6 +226,21 @@ def test_the_command_writes_the_page_beside_the_run_and_says_so(folder, capsys):
         said,
     )
     assert (folder / "report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_the_page_names_refused_routes_and_what_else_is_to_be_known(run, made):
+    run = dataclasses.replace(
+        run,
+        refused={"7": "Route '7': no way leads from keypoint 0 to keypoint 1 <here>"},
+        notes=("2 scenarios of type Ghost were left out",),
+    )
+    page = report_page(run, made[1], load_town("toy"))
+    notes = re.findall(r'<p class="note">(.*?)</p>', page)
+    assert (
+        "Route 7 could not be planned and is in no mean: "
+        "no way leads from keypoint 0 to keypoint 1 &lt;here&gt;"
+    ) in notes
+    assert "2 scenarios of type Ghost were left out" in notes
 
 
 def test_a_half_written_run_and_a_wrong_route_are_refused(folder, run, tmp_path, capsys):
