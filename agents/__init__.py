@@ -43,30 +43,30 @@ AGENTS: dict[str, AgentEntry] = {
     "expert": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="rules over what is visible: follows, predicts, yields, obeys lights and signs",
-        version=2,
+        version=3,
     ),
     "expert-told": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that sees through walls and knows where somebody will step out",
-        version=1,
+        version=2,
         options={"told": True},
     ),
     "expert-blind": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores all other actors (a control for traffic's politeness)",
-        version=2,
+        version=3,
         options={"ignore_actors": True},
     ),
     "expert-redrunner": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores traffic lights (a control for the red-light rule)",
-        version=2,
+        version=3,
         options={"ignore_lights": True},
     ),
     "expert-signrunner": AgentEntry(
         entry_point="agents.expert.agent:Expert",
         summary="the expert that ignores stop signs (a control for the stop-sign rule)",
-        version=2,
+        version=3,
         options={"ignore_signs": True},
     ),
     "highway": AgentEntry(

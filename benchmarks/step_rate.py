@@ -51,7 +51,7 @@ begin = time.perf_counter()
 import di_envs
 imported = time.perf_counter()
 import gymnasium, numpy
-env = gymnasium.make("DriveInsight-Town05Long-v0")
+env = gymnasium.make("DriveInsight-Town05Long-v1")
 env.reset(seed=0)
 for _ in range(3):
     env.step(numpy.array([0.5, 0.0, 0.0], numpy.float32))
@@ -195,7 +195,7 @@ def measure_start(bench: Bench) -> None:
             _, cold = first_steps(Path(folder))
         with bench.doing("warm starts"):
             warm = [first_steps(Path(folder)) for _ in range(3)]
-    print("\n## From `python` to the third step of `DriveInsight-Town05Long-v0`\n")
+    print("\n## From `python` to the third step of `DriveInsight-Town05Long-v1`\n")
     print("| start | seconds |")
     print("|---|---:|")
     print(f"| cold: kernels compiled, town parsed, once for a version and CPU | {cold:.1f} |")

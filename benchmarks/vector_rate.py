@@ -114,7 +114,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--env", default="DriveInsight-Town05Long-v0")
+    parser.add_argument("--env", default="DriveInsight-Town05Long-v1")
     parser.add_argument("--worlds", type=int, default=16)
     parser.add_argument("--rounds", type=int, default=9)
     arguments = parser.parse_args()

@@ -1,7 +1,7 @@
 """DriveInsight's environments: importing this registers their Gymnasium ids, and stays light.
 
-`gym.make("DriveInsight-Town05Long-v0")` works after `import di_envs`; without it,
-`gym.make("di_envs:DriveInsight-Town05Long-v0")`. Numba and the towns are loaded by the first
+`gym.make("DriveInsight-Town05Long-v1")` works after `import di_envs`; without it,
+`gym.make("di_envs:DriveInsight-Town05Long-v1")`. Numba and the towns are loaded by the first
 environment that is made.
 """
 
@@ -17,12 +17,13 @@ from di_envs.config import RouteEnvConfig
 from di_envs.saving import EnvSnapshot, restore, save
 from di_envs.shadowing import check_not_shadowed
 
-# One literal table; a change that can move a score needs a new version number.
+# One literal table; a change that can move a score needs a new version number. An id of a version
+# before makes the newest too, and Gymnasium says so: worlds of before are not kept.
 ENVIRONMENTS = {
-    "DriveInsight-Town05Long-v0": RouteEnvConfig(suite="town05_long"),
-    "DriveInsight-Town05Short-v0": RouteEnvConfig(suite="town05_short"),
-    "DriveInsight-Town05Tiny-v0": RouteEnvConfig(suite="town05_tiny"),
-    "DriveInsight-Toy-v0": RouteEnvConfig(suite="toy"),
+    "DriveInsight-Town05Long-v1": RouteEnvConfig(suite="town05_long"),
+    "DriveInsight-Town05Short-v1": RouteEnvConfig(suite="town05_short"),
+    "DriveInsight-Town05Tiny-v1": RouteEnvConfig(suite="town05_tiny"),
+    "DriveInsight-Toy-v1": RouteEnvConfig(suite="toy"),
 }
 
 # Loaded when first asked for, as they bring Numba with them.
@@ -47,14 +48,16 @@ __all__ = [
 
 
 def _register() -> None:
-    for env_id, config in ENVIRONMENTS.items():
-        if env_id not in gymnasium.registry:
-            gymnasium.register(
-                env_id,
-                entry_point="di_envs.route_env:RouteEnv",
-                vector_entry_point="di_envs.vector_env:RouteVectorEnv",
-                kwargs=config.changes(),
-            )
+    for newest, config in ENVIRONMENTS.items():
+        name, version = newest.rsplit("-v", 1)
+        for env_id in (f"{name}-v{number}" for number in range(int(version) + 1)):
+            if env_id not in gymnasium.registry:
+                gymnasium.register(
+                    env_id,
+                    entry_point="di_envs.route_env:RouteEnv",
+                    vector_entry_point="di_envs.vector_env:RouteVectorEnv",
+                    kwargs=config.changes(),
+                )
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """Conformance checks to run on an environment of your own: your map, your options, your wrappers.
 
-`check_environment(lambda: gymnasium.make("DriveInsight-Toy-v0", control_dt_s=0.05))` raises
+`check_environment(lambda: gymnasium.make("DriveInsight-Toy-v1", control_dt_s=0.05))` raises
 `AssertionError` with the reason, or returns nothing. All drive with actions keyed by the seed.
 """
 

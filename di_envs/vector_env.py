@@ -44,7 +44,7 @@ class VectorSnapshot:
 class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     """N `RouteEnv`s side by side, by Gymnasium's rules for autoreset, seeds and `info`.
 
-    `gym.make_vec("DriveInsight-Town05Long-v0", num_envs=16)` makes one. Observations, rewards and
+    `gym.make_vec("DriveInsight-Town05Long-v1", num_envs=16)` makes one. Observations, rewards and
     flags come as fresh arrays with a leading axis of N.
 
     Attributes:

@@ -8,4 +8,4 @@ suite. Nothing else raises it: no renamed module, no comment, no new sensor or o
 
 from __future__ import annotations
 
-WORLD_VERSION = 2
+WORLD_VERSION = 3

@@ -16,7 +16,7 @@ ROUTE, SEED = "0", 0
 def main() -> None:
     """Drives the route to its end."""
     # Without `observations` come cameras and LiDAR too; the expert needs neither.
-    env = gymnasium.make("DriveInsight-Town05Short-v0", observations=("prompt", "inertial"))
+    env = gymnasium.make("DriveInsight-Town05Short-v1", observations=("prompt", "inertial"))
 
     # A route is named by its id (a string) or its index (an integer). Equal seeds give equal
     # episodes, bit for bit: traffic, walkers, lights, and the noise of the sensors.

@@ -33,7 +33,7 @@ def drive(
 
 def main() -> None:
     """Four seconds of driving, then four seconds in three branches."""
-    env = gymnasium.make("DriveInsight-Town05Long-v0", observations=("prompt", "inertial"))
+    env = gymnasium.make("DriveInsight-Town05Long-v1", observations=("prompt", "inertial"))
     observation, _ = env.reset(seed=0, options={"route": 3})
     memory = load_agent("expert").start(env.unwrapped.plan, 0)
     observation, memory, _ = drive(env, observation, memory, 40, brake=False)

@@ -60,7 +60,7 @@ class Training:
 def make_worlds(training: Training) -> VecNormalize:
     """The worlds, as Stable-Baselines3 takes them."""
     envs = gymnasium.make_vec(
-        "DriveInsight-Town05Tiny-v0",
+        "DriveInsight-Town05Tiny-v1",
         num_envs=training.worlds,
         threads=training.threads,
         autoreset_mode="SameStep",

@@ -50,9 +50,19 @@ def test_every_id_of_the_table_is_registered_with_a_shipped_suite(env_id):
     assert di_envs.ENVIRONMENTS[env_id].suite in suite_names()
 
 
+@pytest.mark.parametrize("env_id", di_envs.ENVIRONMENTS)
+def test_an_id_of_a_version_before_makes_the_newest_and_is_warned_of(env_id):
+    name, newest = env_id.rsplit("-v", 1)
+    assert int(newest) >= 1
+    for version in range(int(newest)):
+        with pytest.warns(UserWarning, match="out of date"):
+            env = gymnasium.make(f"{name}-v{version}", disable_env_checker=True)
+        assert env.unwrapped.config.suite == di_envs.ENVIRONMENTS[env_id].suite
+
+
 def test_make_imports_the_module_named_before_the_id():
     done = run_python(
-        "import gymnasium; print(gymnasium.make('di_envs:DriveInsight-Toy-v0').unwrapped.route_ids)"
+        "import gymnasium; print(gymnasium.make('di_envs:DriveInsight-Toy-v1').unwrapped.route_ids)"
     )
     assert done.returncode == 0, done.stderr
 
@@ -100,7 +110,7 @@ def test_the_check_passes_where_nothing_is_hidden_and_where_nothing_is_ours(tmp_
 
 def test_an_unknown_option_is_refused_with_a_suggestion():
     with pytest.raises(ValueError, match=r"'trafic'; did you mean 'traffic'\?"):
-        gymnasium.make("DriveInsight-Toy-v0", trafic=3)
+        gymnasium.make("DriveInsight-Toy-v1", trafic=3)
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_gymnasiums_checker_has_nothing_to_say(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # it opens a window too
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made = gymnasium.make("DriveInsight-Toy-v0")
+        made = gymnasium.make("DriveInsight-Toy-v1")
         check_env(made.unwrapped)
         made.close()
 
@@ -127,7 +127,7 @@ def test_unknown_routes_and_suites_are_refused_when_the_environment_is_made():
 
 @pytest.mark.parametrize("wrap", [False, True])
 def test_a_step_before_the_first_reset_is_refused(wrap):
-    env = gymnasium.make("DriveInsight-Toy-v0") if wrap else RouteEnv(suite="toy")
+    env = gymnasium.make("DriveInsight-Toy-v1") if wrap else RouteEnv(suite="toy")
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         env.step(STAND)
 

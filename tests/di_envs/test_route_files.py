@@ -118,7 +118,7 @@ def test_an_environment_leaves_refused_routes_out_and_says_why_where_one_is_aske
     path = str(written(tmp_path, [route("a"), route("far", FAR)]))
     options = {"town": "toy", "routes": path, "suite": None, "traffic": 0, "walkers": 0}
     with pytest.warns(RouteWarning, match="1 of 2 routes cannot be planned"):
-        env = gymnasium.make("DriveInsight-Toy-v0", observations=("prompt",), **options)
+        env = gymnasium.make("DriveInsight-Toy-v1", observations=("prompt",), **options)
     assert env.unwrapped.route_ids == ("a",)  # type: ignore[attr-defined]
     with pytest.raises(ValueError, match=r"Route 'far': keypoint 0 .* is 1311\.7 m from"):
         env.reset(options={"route": "far"})

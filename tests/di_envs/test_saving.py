@@ -58,7 +58,7 @@ class Odometer(gymnasium.Wrapper):
 
 
 def wrapped():
-    made = gymnasium.make("DriveInsight-Toy-v0", observations=GROUPS)
+    made = gymnasium.make("DriveInsight-Toy-v1", observations=GROUPS)
     env = TimeLimit(RecordEpisodeStatistics(made), 1000)
     env = NormalizeReward(FrameStackObservation(SpeedStack(env), 3))
     return TransformReward(Odometer(env), lambda reward: reward)

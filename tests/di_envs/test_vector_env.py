@@ -14,7 +14,7 @@ from di_envs.config import OBSERVATION_GROUPS
 from di_envs.route_env import RouteEnv
 from di_envs.vector_env import RouteVectorEnv
 
-TOY = "DriveInsight-Toy-v0"
+TOY = "DriveInsight-Toy-v1"
 N = 3
 # the first drives as fast as it can and soon leaves its route, the others are cut off
 ACTIONS = np.array([[1.0, 0.0, 0.0], [0.6, 0.3, 0.0], [0.5, -0.2, 0.0]], np.float32)

@@ -15,7 +15,7 @@ from di_envs.testing import check_environment
 from wrappers.actions import PedalWrapper, WaypointWrapper, pedal_vector
 from wrappers.vectors import VectorObservations
 
-TOY = "DriveInsight-Toy-v0"
+TOY = "DriveInsight-Toy-v1"
 
 
 def toy(**options):

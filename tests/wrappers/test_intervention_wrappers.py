@@ -22,7 +22,7 @@ with warnings.catch_warnings():  # its tests import a game of its own in a way i
     warnings.simplefilter("ignore", DeprecationWarning)
     from pettingzoo.test import parallel_api_test
 
-TOY = "DriveInsight-Toy-v0"
+TOY = "DriveInsight-Toy-v1"
 EDITS = "noise:map,sigma=0.5; mask:obstacles,p=0.3@t>1; delay:speed+routing,steps=3; drop:speed@t>2"
 OPTIONS = {"suite": "town05_tiny", "observations": ("prompt",), "traffic": 20, "walkers": 5}
 GO = np.array([0.5, 0.0, 0.0], np.float32)

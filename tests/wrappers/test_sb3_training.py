@@ -19,8 +19,8 @@ from wrappers.prompt_features import KEYS, PromptFeatures
 from wrappers.sb3 import Sb3VecEnv
 from wrappers.vectors import VectorObservations
 
-TOY = "DriveInsight-Toy-v0"
-TINY = "DriveInsight-Town05Tiny-v0"
+TOY = "DriveInsight-Toy-v1"
+TINY = "DriveInsight-Town05Tiny-v1"
 
 
 @pytest.fixture(autouse=True)

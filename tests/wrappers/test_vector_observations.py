@@ -11,7 +11,7 @@ from di_envs.testing import check_environment
 from di_envs.vectors import as_vector, as_vectors_space, vector_space
 from wrappers.vectors import VectorObservations
 
-TOY = "DriveInsight-Toy-v0"
+TOY = "DriveInsight-Toy-v1"
 
 
 def test_each_number_is_divided_by_the_largest_it_can_be():

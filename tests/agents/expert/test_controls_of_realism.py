@@ -17,7 +17,7 @@ from di_envs.world.world import Event, WorldView
 def drive(agent_name: str, route: int, look: Callable[[WorldView], None]) -> list[Event]:
     """Drives a route of town05_long, without scenarios, to its end and returns its events."""
     env: Any = gymnasium.make(
-        "DriveInsight-Town05Long-v0", observations=("prompt",), scenarios="none"
+        "DriveInsight-Town05Long-v1", observations=("prompt",), scenarios="none"
     ).unwrapped
     agent = load_agent(agent_name)
     observation, _ = env.reset(seed=route, options={"route": route})

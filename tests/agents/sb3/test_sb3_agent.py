@@ -22,7 +22,7 @@ from leaderboard.running.jobs import Job, RunSpec
 from wrappers.actions import PedalWrapper, WaypointWrapper
 from wrappers.vectors import VectorObservations
 
-TOY = "DriveInsight-Toy-v0"
+TOY = "DriveInsight-Toy-v1"
 SMALL = {"net_arch": [8]}
 
 

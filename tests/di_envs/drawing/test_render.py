@@ -250,7 +250,7 @@ def test_each_world_and_each_ego_has_a_picture_of_its_own():
 
 OPEN_A_WINDOW = """
 import numpy as np, gymnasium, di_envs
-env = gymnasium.make("DriveInsight-Toy-v0", traffic=0, walkers=0, render_mode="human")
+env = gymnasium.make("DriveInsight-Toy-v1", traffic=0, walkers=0, render_mode="human")
 env.reset(seed=1)
 for _ in range(2):
     env.step(np.zeros(3, np.float32))

@@ -292,7 +292,7 @@ def test_depth_semantic_and_instance_do_not_change_the_picture(town, empty):
 
 _DIGEST = """
 import gymnasium, hashlib, di_envs
-env = gymnasium.make("DriveInsight-Toy-v0", observations=("camera",), weather="HardRainNoon")
+env = gymnasium.make("DriveInsight-Toy-v1", observations=("camera",), weather="HardRainNoon")
 observation, _ = env.reset(seed=5)
 digest = hashlib.sha256()
 for _ in range(3):
@@ -313,7 +313,7 @@ def test_the_same_seed_gives_the_same_bits_in_two_processes():
 
 
 def test_the_same_bits_come_after_restore():
-    env = gymnasium.make("DriveInsight-Toy-v0", observations=("camera",), weather="SoftRainSunset")
+    env = gymnasium.make("DriveInsight-Toy-v1", observations=("camera",), weather="SoftRainSunset")
     env.reset(seed=8)
     snapshot = di_envs.save(env)
 

@@ -287,7 +287,7 @@ def test_each_tick_scans_the_half_of_the_sweep_that_is_its_turn(busy):
     ("control_dt_s", "rows"), [(0.05, 2816), (0.1, 5600), (0.15, 5600), (0.5, 5600)]
 )
 def test_an_environment_of_20_hz_sees_half_sweeps_and_slower_ones_whole_ones(control_dt_s, rows):
-    env = gymnasium.make("DriveInsight-Toy-v0", observations=("lidar",), control_dt_s=control_dt_s)
+    env = gymnasium.make("DriveInsight-Toy-v1", observations=("lidar",), control_dt_s=control_dt_s)
     seen, _ = env.reset(seed=1)
     for expected_tick in range(2):
         assert seen["lidar"].shape == env.observation_space["lidar"].shape == (rows, 4)
@@ -375,7 +375,7 @@ def test_another_process_sees_the_same_bits(town):
 def test_the_same_bits_are_seen_after_a_restore_and_all_lie_in_the_space():
     config = LidarConfig(noise_m=0.5, semantic=True)
     env = gymnasium.make(
-        "DriveInsight-Town05Tiny-v0", observations=("lidar", "prompt"), lidar=config
+        "DriveInsight-Town05Tiny-v1", observations=("lidar", "prompt"), lidar=config
     )
     seen, _ = env.reset(seed=5)
     assert seen["lidar"].shape == (5600, 4)
