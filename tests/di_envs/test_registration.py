@@ -55,7 +55,7 @@ def test_an_id_of_a_version_before_makes_the_newest_and_is_warned_of(env_id):
     name, newest = env_id.rsplit("-v", 1)
     assert int(newest) >= 1
     for version in range(int(newest)):
-        with pytest.warns(UserWarning, match="out of date"):
+        with pytest.warns(DeprecationWarning, match="out of date"):
             env = gymnasium.make(f"{name}-v{version}", disable_env_checker=True)
         assert env.unwrapped.config.suite == di_envs.ENVIRONMENTS[env_id].suite
 
