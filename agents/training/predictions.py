@@ -40,10 +40,11 @@ def look(
     for t in range(len(batch.inputs) - 1):
         with torch.no_grad():
             output, inputs = seen(t, bank)
-        assert output.bev is not None, "only a memory needs a past"
+        assert output.remembered is not None, "only a memory needs a past"
         assert inputs.pose is not None
-        bank = bank or policy.empty_bank(len(hidden), like=output.bev)
-        bank = bank.remember(output.bev, inputs.pose)
+        assert policy.perception is not None
+        bank = bank or policy.perception.empty_bank(len(hidden), like=output.remembered)
+        bank = bank.remember(output.remembered, inputs.pose)
         begun = batch.begun[t].bool().to(device)
         valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
         bank = dataclasses.replace(bank, valid=valid)
@@ -56,6 +57,8 @@ def _to(values: Any, device: torch.device) -> Any:
     def moved(value: Any) -> Any:
         if isinstance(value, Tensor):
             return value.to(device, non_blocking=True)
+        if isinstance(value, tuple):
+            return tuple(moved(item) for item in value)
         return {name: moved(item) for name, item in value.items()} if value else value
 
     fields = dataclasses.fields(values)
