@@ -5,7 +5,8 @@
     prompt ------------------> PromptEncoder ---------------+
 
 `forward` is a pure function of its inputs: what is hidden in training comes in as `present`, and
-what is remembered comes in and goes out as a `MemoryBank`.
+what is remembered comes in and goes out as a `MemoryBank`. Who hands in rows that are `seen` needs
+no sensors: so the planner learns at hundreds of samples a second.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.driveinsight.bev_tokens import BevTokens
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.heads import Heads
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.perception import Encoded, Perception
-from agents.driveinsight.planner import BevTokens, Planner
-from agents.driveinsight.tokens import PromptEncoder
+from agents.driveinsight.planner import Planner
+from agents.driveinsight.reading import read_seen
+from agents.driveinsight.seen import Seen
+from agents.driveinsight.tokens import PromptEncoder, told_route
 from agents.networks.taps import Tap
 from di_envs.prompt import COMPONENTS
 
@@ -37,6 +41,7 @@ class Inputs:
             empty without cameras.
         points: (B, P, 4); None without LiDAR.
         pose: (B, 3) odometry; None without a memory.
+        seen: Rows to plan by instead of those that the policy's own eyes would see; None to look.
     """
 
     prompt: Mapping[str, Tensor]
@@ -44,6 +49,7 @@ class Inputs:
     images: tuple[Tensor, ...] = ()
     points: Tensor | None = None
     pose: Tensor | None = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,12 +61,14 @@ class Output:
         bev: (B, C, X, Y) fused features; None without sensors.
         encoded: What the sensors show, with what is to be remembered; None without sensors.
         heads: What the features say; None without sensors.
+        seen: Rows that were read off the heads; None without sensors.
     """
 
     waypoints: Tensor
     bev: Tensor | None = None
     encoded: Encoded | None = None
     heads: Heads | None = None
+    seen: Seen | None = None
 
     @property
     def remembered(self) -> Tensor | None:
@@ -74,10 +82,11 @@ class Policy(nn.Module):
     def __init__(self, config: PolicyConfig) -> None:
         super().__init__()
         self.config = config
-        width, cells = config.bev_width, config.grid.cells
         self.perception = Perception(config) if config.sensors else None
-        self.bev = BevTokens(width, cells, config.planner) if config.sensors else None
-        self.prompt = PromptEncoder(config.planner.width)
+        self.bev = (
+            BevTokens(config.bev_width, config.grid, config.planner) if config.sensors else None
+        )
+        self.prompt = PromptEncoder(config.planner)
         self.planner = Planner(config.planner)
         self.waypoints = Tap()
         given = torch.tensor([float(name in config.prompt) for name in COMPONENTS])
@@ -95,15 +104,40 @@ class Policy(nn.Module):
             bank: What is remembered; None is an empty bank.
         """
         present = inputs.present * self.given
-        tokens = self.prompt(inputs.prompt, present[:, : len(COMPONENTS)])
         if self.bev is None or self.perception is None:
-            return Output(waypoints=self.waypoints(self.planner(tokens, None, None)))
+            return Output(waypoints=self.plan(inputs.prompt, present, None, None))
+        if inputs.seen is not None:
+            return Output(waypoints=self.plan(inputs.prompt, present, inputs.seen, None))
         encoded = self.perception.encode(inputs.images, inputs.points)
         bev = self.perception.fuse(encoded, inputs.pose, bank)
-        patches = self.bev(bev, present[:, TOKENS.index("bev")])
+        heads = self.perception.say(bev, encoded)
+        seen = read_seen(heads, self.config.grid)
         return Output(
-            waypoints=self.waypoints(self.planner(tokens, patches, self.bev.place)),
+            waypoints=self.plan(inputs.prompt, present, seen, bev),
             bev=bev,
             encoded=encoded,
-            heads=self.perception.say(bev, encoded),
+            heads=heads,
+            seen=seen,
         )
+
+    def plan(
+        self, prompt: Mapping[str, Tensor], present: Tensor, seen: Seen | None, bev: Tensor | None
+    ) -> Tensor:
+        """Waypoints from what is told and what is seen.
+
+        Args:
+            prompt: The components by name.
+            present: (B, 10) 0 or 1 in the order of `TOKENS`.
+            seen: Rows that are seen; None for a policy without sensors.
+            bev: (B, C, X, Y) features; None where there are rows alone.
+
+        Returns:
+            (B, T, 2) x ahead, y right [m].
+        """
+        tokens = self.prompt(prompt, present[:, : len(COMPONENTS)])
+        if self.bev is not None and seen is not None:
+            route = told_route(prompt, present)
+            there = present[:, TOKENS.index("bev")]
+            tokens.append(self.bev(seen, bev, route, there, self.prompt))
+        waypoints: Tensor = self.waypoints(self.planner(tokens))
+        return waypoints

@@ -30,6 +30,8 @@ from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import load_training_town
 from agents.training.variation import Variation
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
+from di_envs.town.plan import RoutePlan
+from di_envs.town.town import Town
 
 STANDING_MPS = 0.1
 PREFETCHED = 4  # batches that each process renders ahead
@@ -66,13 +68,19 @@ class Moments:
         return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
 
     def held_out(self, share: float) -> tuple[Moments, Moments]:
-        """Those to learn from, and those of the drives kept out: at least one, at most half.
+        """Those to learn from, and those of the drives kept out; see `held_out_rows`."""
+        taught, kept_out = self.held_out_rows(share)
+        return self._rows(taught), self._rows(kept_out)
+
+    def held_out_rows(self, share: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which of them to learn from, and which are of drives kept out: one to half of these.
 
         Raises:
             TrainingError: If there are too few drives for that.
         """
+        every = np.arange(len(self))
         if not share:
-            return self, self._rows(np.zeros(0, np.int64))
+            return every, every[:0]
         drives = np.unique(self.drive)
         draws = self.draws[drives]
         count = min(max(int((draws < share).sum()), 1), len(drives) // 2)
@@ -82,7 +90,7 @@ class Moments:
                 "there is one drive alone, so none can be kept out of training to measure by: "
                 "collect more, or give --held-out 0"
             )
-        return self._rows(np.flatnonzero(~kept_out)), self._rows(np.flatnonzero(kept_out))
+        return every[~kept_out], every[kept_out]
 
     def _rows(self, rows: NDArray[np.int64]) -> Moments:
         return replace(self, drive=self.drive[rows], moment=self.moment[rows])
@@ -145,6 +153,29 @@ def _moments_of(drive: RecordedDrive, standing_share: float) -> Iterator[int]:
             yield moment
 
 
+class TownShelf:
+    """Training towns, loaded when they are first wanted and kept."""
+
+    def __init__(self) -> None:
+        self._towns: dict[str, tuple[Town, tuple[RoutePlan, ...]]] = {}
+
+    def of(self, drive: RecordedDrive) -> tuple[Town, tuple[RoutePlan, ...]]:
+        """The town of a drive, and its routes planned.
+
+        Raises:
+            TrainingError: If the drive was made on another version of it.
+        """
+        name = str(drive.facts["town"])
+        if name not in self._towns:
+            self._towns[name] = load_training_town(name)
+        if self._towns[name][0].content_hash != drive.facts["town_hash"]:
+            raise TrainingError(
+                f"the drives in {name} were made on another version of that town: collect them "
+                f"again into an empty folder"
+            )
+        return self._towns[name]
+
+
 class Samples(Dataset[Sample]):
     """Samples by their number over the whole training: step x batch + place in it.
 
@@ -161,6 +192,7 @@ class Samples(Dataset[Sample]):
         self._measured = kept_out.some(training.measured)
         self._drives: dict[int, RecordedDrive] = {}
         self._renderers: dict[str, Renderer] = {}
+        self._towns = TownShelf()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what it is made from, without what it has read."""
@@ -201,13 +233,7 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            loaded, plans = load_training_town(town)
-            if loaded.content_hash != drive.facts["town_hash"]:
-                raise TrainingError(
-                    f"the drives in {town} were made on another version of that town: collect them "
-                    f"again into an empty folder"
-                )
-            self._renderers[town] = Renderer(self._config, loaded, plans)
+            self._renderers[town] = Renderer(self._config, *self._towns.of(drive))
         return self._renderers[town]
 
 

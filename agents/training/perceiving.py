@@ -38,6 +38,7 @@ from agents.training.loading import PREFETCHED, begin_worker, load_moments
 from agents.training.loading import Moments as Chosen
 from agents.training.log import append_row, forget_rows_after
 from agents.training.perception_metrics import figures, perception_sums
+from agents.training.predictions import on_device
 from agents.training.sequences import Moments, SequenceRenderer, joined
 from agents.training.towns import load_training_town
 from agents.training.variation import Variation
@@ -324,7 +325,7 @@ class Perceiving:
 
     def _look(self, moments: Moments) -> tuple[Heads, tuple[Tensor, ...], PerceptionTargets]:
         device = self._device()
-        moments = _moved(moments, device)
+        moments = on_device(moments, device)
         mixed = self.config.precision == "bfloat16"
         with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
             heads, depth = look(self.perception, moments, self.config.length)
@@ -418,21 +419,4 @@ def _rows(values: Any, chosen: Tensor) -> Any:
             return tuple(cut(item) for item in value)
         return None if value is None else value[chosen.to(value.device)]
 
-    return _mapped(values, cut)
-
-
-def _moved(values: Any, device: torch.device) -> Any:
-    """A bundle of tensors on a device."""
-
-    def moved(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(moved(item) for item in value)
-        if isinstance(value, PerceptionTargets):
-            return _moved(value, device)
-        return None if value is None else value.to(device, non_blocking=True)
-
-    return _mapped(values, moved)
-
-
-def _mapped(values: Any, change: Callable[[Any], Any]) -> Any:
-    return replace(values, **{name: change(value) for name, value in vars(values).items()})
+    return replace(values, **{name: cut(value) for name, value in vars(values).items()})

@@ -21,10 +21,11 @@ TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
 
 Examples:
   driveinsight train --config tiny --steps 1500 --check-routes 2     a first try, in minutes
-  driveinsight train --config small --data data --output runs/small
-  driveinsight train --config small --init-from runs/small-prompt-only/policy
-  driveinsight train --config small --overfit 1 --steps 300          can it learn at all?
-  torchrun --nproc-per-node 4 -m leaderboard train --config small    four processes, or GPUs
+  driveinsight train --config driveinsight --data data --output runs/driveinsight
+  driveinsight train --plan-only --batch 128 --steps 20000           the planner alone, first
+  driveinsight train --init-from runs/plan/policy --planner-rate 0.3
+  driveinsight train --overfit 1 --steps 300                         can it learn at all?
+  torchrun --nproc-per-node 4 -m leaderboard train                   four processes, or GPUs
 
 Pictures are rendered while it trains, each sample in a weather of its own. Into --output go a
 checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores of routes that
@@ -36,8 +37,15 @@ command goes on, and comes to the same bits (on a CPU)."""
 class Train:
     """The arguments of `driveinsight train`."""
 
-    config: Annotated[str, says("NAME", "small")] = "small"
-    """Configuration of the policy: tiny, small, small-prompt-only, paper, …"""
+    config: Annotated[str, says("NAME", "driveinsight")] = "driveinsight"
+    """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …"""
+
+    plan_only: bool = False
+    """Train the planner alone, by what truly is in sight instead of pictures: hundreds of samples a
+    second. What sees stays as it is."""
+
+    cache: Annotated[Path, says("DIR", "cache")] = Path("cache")
+    """Where moments are kept encoded for --plan-only: 5 kB each, at most 100,000 of them."""
 
     data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
     """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""
@@ -130,7 +138,7 @@ class Train:
     def _plan(self) -> TrainingPlan:
         """What the arguments ask for."""
         from agents.driveinsight.config import config_named
-        from agents.training.config import TrainConfig
+        from agents.training.config import PLANNING, TrainConfig
         from agents.training.session import TrainingPlan
 
         try:
@@ -145,6 +153,7 @@ class Train:
                 overfit=self.overfit,
                 threads=self.threads,
                 held_out=self.held_out,
+                **(PLANNING if self.plan_only else {}),
             )
         except ValueError as error:
             raise UsageError(str(error)) from error
@@ -157,6 +166,7 @@ class Train:
             device=self.device,
             precision=self.precision,
             workers=self.workers,
+            cache=self.cache,
         )
 
 
@@ -186,7 +196,8 @@ def _tell_stopped(session: Session) -> None:
 
 
 def _tell_trained(session: Session) -> None:
-    from agents.training.log import HELD_OUT, read_rows, write_curve
+    from agents.training.config import HELD_OUT
+    from agents.training.log import read_rows, write_curve
     from agents.training.loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     folder = session.plan.folder
