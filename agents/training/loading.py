@@ -12,6 +12,7 @@ import os
 import zlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
-from agents.training.towns import load_training_town
+from agents.training.towns import training_plan, training_town
 from agents.training.variation import Variation
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
 
@@ -201,13 +202,13 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            loaded, plans = load_training_town(town)
+            loaded = training_town(town)
             if loaded.content_hash != drive.facts["town_hash"]:
                 raise TrainingError(
                     f"the drives in {town} were made on another version of that town: collect them "
                     f"again into an empty folder"
                 )
-            self._renderers[town] = Renderer(self._config, loaded, plans)
+            self._renderers[town] = Renderer(self._config, loaded, partial(training_plan, town))
         return self._renderers[town]
 
 
