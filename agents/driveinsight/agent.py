@@ -22,8 +22,8 @@ from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
-from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
+from agents.networks.taps import editing
 from agents.one_thread import one_thread
 from di_envs.actions.controllers import (
     ControllerMemory,

@@ -12,7 +12,7 @@ from agents.driveinsight.config import CameraEncoderConfig, GridConfig
 from agents.driveinsight.lift import FrustumPooling
 from agents.driveinsight.pyramid import FeaturePyramid
 from agents.driveinsight.resnet import ResNet
-from agents.driveinsight.taps import Tap
+from agents.networks.taps import Tap
 from di_envs.sensors.camera.config import rig_of
 
 # Of ImageNet's pixels, as published weights expect them

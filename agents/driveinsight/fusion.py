@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Tap
+from agents.networks.taps import Tap
 
 
 class SqueezeExcitation(nn.Module):

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from agents.driveinsight.config import GridConfig, LidarEncoderConfig
 from agents.driveinsight.pyramid import FeaturePyramid
 from agents.driveinsight.sparse import HalvingBlock, SparseVoxels, SubmanifoldBlock
-from agents.driveinsight.taps import Tap
+from agents.networks.taps import Tap
 
 POINT_FEATURES = 5  # offset from the voxel's centre (3), height, intensity
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from agents.driveinsight.config import GridConfig
 from agents.driveinsight.fusion import SqueezeExcitation, conv_block
-from agents.driveinsight.taps import Tap
+from agents.networks.taps import Tap
 
 
 @dataclass(frozen=True, kw_only=True)

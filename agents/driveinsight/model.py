@@ -25,8 +25,8 @@ from agents.driveinsight.lidar import LidarEncoder
 from agents.driveinsight.memory import MemoryBank, TemporalFusion, empty_bank
 from agents.driveinsight.planner import BevTokens, Planner
 from agents.driveinsight.semantics import BevClass
-from agents.driveinsight.taps import Tap
 from agents.driveinsight.tokens import PromptEncoder
+from agents.networks.taps import Tap
 from di_envs.prompt import COMPONENTS
 
 

@@ -6,14 +6,13 @@ Autonomous Driving (UniAD), CVPR 2023.
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import Tensor, nn
 
 from agents.driveinsight.config import BEV, TOKENS, PlannerConfig
-from agents.driveinsight.taps import Tap
-from agents.driveinsight.tokens import mlp
+from agents.networks.decoder import DecoderLayer
+from agents.networks.mlp import mlp
+from agents.networks.taps import Tap
 
 _STEP_M = 2.0  # scale of the distance between two waypoints
 
@@ -35,43 +34,6 @@ class BevTokens(nn.Module):
         """(B, C, X, Y) and (B,) 0 or 1 to (B, T, width) before their places are added."""
         tokens = self.mix(self.patches(bev).flatten(2).transpose(1, 2))  # (B, T, width)
         return self.tokens(tokens * present[:, None, None])
-
-
-class CrossAttention(nn.Module):
-    """Multi-head attention of queries to tokens, its weights to be looked at."""
-
-    def __init__(self, width: int, heads: int) -> None:
-        super().__init__()
-        self.heads = heads
-        self.query, self.key = nn.Linear(width, width), nn.Linear(width, width)
-        self.value, self.out = nn.Linear(width, width), nn.Linear(width, width)
-        self.weights = Tap()
-
-    def forward(self, query: Tensor, tokens: Tensor) -> Tensor:
-        """(B, Q, width) and (B, T, width) to (B, Q, width)."""
-        q, k, v = (
-            layer(x).unflatten(2, (self.heads, -1)).transpose(1, 2)  # (B, heads, Q or T, width')
-            for layer, x in ((self.query, query), (self.key, tokens), (self.value, tokens))
-        )
-        logits = q @ k.transpose(2, 3) / math.sqrt(q.shape[3])
-        weights = self.weights(logits.softmax(dim=-1))  # (B, heads, Q, T), rows sum to 1
-        return self.out((weights @ v).transpose(1, 2).flatten(2))
-
-
-class DecoderLayer(nn.Module):
-    """Cross-attention and an MLP, each with a shortcut."""
-
-    def __init__(self, width: int, heads: int) -> None:
-        super().__init__()
-        self.norm1, self.norm2 = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.attention = CrossAttention(width, heads)
-        self.mix = nn.Sequential(
-            nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width)
-        )
-
-    def forward(self, query: Tensor, tokens: Tensor) -> Tensor:
-        query = query + self.attention(self.norm1(query), tokens)
-        return query + self.mix(self.norm2(query))
 
 
 class Planner(nn.Module):

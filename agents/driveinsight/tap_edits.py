@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Edit, tap_names
+from agents.networks.taps import Edit, tap_names
 from di_envs.config import check_name
 from di_envs.edits.conditions import ALWAYS, Condition
 from di_envs.edits.text import EditError, EditText

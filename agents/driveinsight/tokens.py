@@ -13,7 +13,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Tap
+from agents.networks.mlp import mlp
+from agents.networks.sets import SetEncoder
+from agents.networks.taps import Tap
 from di_envs.prompt import COMPONENTS, ROUTING_POINTS, SPEED_HISTORY
 from di_envs.town.lanes import LightState
 from di_envs.town.map_chunks import MapKind
@@ -24,11 +26,6 @@ _METRES = 20.0  # coordinates are divided by this
 _SPEED = 10.0  # speeds [m/s] are divided by this
 
 
-def mlp(inputs: int, width: int) -> nn.Sequential:
-    """Two layers."""
-    return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, width))
-
-
 def _one_hot(column: Tensor, classes: int) -> Tensor:
     return F.one_hot(column.long().clamp(0, classes - 1), classes).float()
 
@@ -37,23 +34,6 @@ def _pose(columns: Tensor) -> Tensor:
     """(..., 3) x, y, yaw to (..., 4) scaled place, cosine and sine."""
     yaw = columns[..., 2:3]
     return torch.cat([columns[..., :2] / _METRES, yaw.cos(), yaw.sin()], dim=-1)
-
-
-class SetEncoder(nn.Module):
-    """Encodes each row, then takes the largest and the mean over the valid ones."""
-
-    def __init__(self, inputs: int, width: int) -> None:
-        super().__init__()
-        self.row = mlp(inputs, width)
-        self.join = nn.Linear(2 * width, width)
-
-    def forward(self, rows: Tensor, valid: Tensor) -> Tensor:
-        """(..., K, F) rows and (..., K) 0 or 1 to (..., width); pools zeros where none is."""
-        mask = valid[..., None]
-        encoded = F.relu(self.row(rows)) * mask
-        largest = encoded.amax(dim=-2)  # ReLU: an invalid row is below any other
-        mean = encoded.sum(dim=-2) / mask.sum(dim=-2).clamp(min=1.0)
-        return self.join(torch.cat([largest, mean], dim=-1))
 
 
 class CommandEncoder(nn.Module):

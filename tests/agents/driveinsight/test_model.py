@@ -20,8 +20,8 @@ from agents.driveinsight.config import (
 )
 from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
-from agents.driveinsight.taps import editing, tap_names, watching
 from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
+from agents.networks.taps import editing, tap_names, watching
 from tests.agents.driveinsight.random_inputs import random_inputs, random_targets, sample
 
 SMALL = ["small", "small-without-cameras", "small-without-lidar", "small-prompt-only"]

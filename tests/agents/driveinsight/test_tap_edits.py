@@ -11,8 +11,8 @@ from agents.driveinsight.config import config_named
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
-from agents.driveinsight.taps import editing, watching
 from agents.driveinsight.weights import save_pretrained
+from agents.networks.taps import editing, watching
 from di_envs.edits.text import EditError, read_edits
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS

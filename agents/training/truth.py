@@ -1,0 +1,146 @@
+"""What truly is there, in the rows that perception says: its targets, and a stand-in for it.
+
+Rows have the columns of `agents.driveinsight.seen`. Of objects the last one says whether the car
+could see them; of signals there is at most one, that which governs the car's own lane.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.driveinsight.config import GridConfig
+from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
+from agents.expert.occlusion import Buildings, buildings_of, collect_hiders, is_hidden
+from di_envs.numerics.arrays import Float32, Float64
+from di_envs.numerics.geometry import to_local, wrap_angle
+from di_envs.numerics.integers import as_int64
+from di_envs.numerics.kernels import kernel
+from di_envs.prompt import LEVEL_M
+from di_envs.prompt_surroundings import fill_obstacle
+from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
+from di_envs.town.queries import nearest_driving_lane_towards, pose_at
+from di_envs.world.state import ActorKind, State
+from di_envs.world.world import WorldView
+
+SIGNAL_AHEAD_M = 50.0  # along the lane, up to which a stop line governs the car
+ON_LANE_M = 3.0  # from a lane's middle, within which the car is on it
+
+_ABSENT, _PROP = int(ActorKind.ABSENT), int(ActorKind.PROP)
+_LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
+_RED, _YELLOW, _GREEN = int(LightState.RED), int(LightState.YELLOW), int(LightState.GREEN)
+
+
+def seen_truth(
+    view: WorldView, grid: GridConfig
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Who is on the grid, and the signal that governs the ego's lane.
+
+    Args:
+        view: Of the world.
+        grid: Of the ego; whose middle lies outside it is left out, as is who is on another level.
+
+    Returns:
+        Objects (N, 9), in the order of actors, the last column 1 for those in sight and 0 for those
+        hidden behind others or buildings; and signals (M, 8), M being 0 or 1.
+    """
+    state, town = view.state, view.town
+    sides = np.array([grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m])
+    objects = np.zeros((state.kind.size, OBJECT_COLUMNS), np.float32)
+    count = _fill_objects(state, buildings_of(town), sides, objects)
+    signals = np.zeros((1, SIGNAL_COLUMNS), np.float32)
+    line = governing_line(state, town.lanes, town.signals)
+    if line >= 0:
+        _fill_signal(state, town.signals, line, signals[0])
+    return objects[:count], signals[: int(line >= 0)]
+
+
+@kernel
+def _fill_objects(state: State, buildings: Buildings, sides: Float64, out: Float32) -> int:
+    """Fills rows with those on the grid; returns how many.
+
+    Args:
+        state: The world.
+        buildings: Of the town.
+        sides: (4,) least and greatest x, least and greatest y of the grid, ego frame [m].
+        out: (A, 9) zeros, written.
+    """
+    kind, n = state.kind, 0
+    pose = (state.x[0], state.y[0], state.yaw[0])
+    bodies = np.empty(kind.size, np.int32)
+    walls = np.empty(buildings.x.size, np.int32)
+    reach = math.hypot(max(sides[1], -sides[0]), max(sides[3], -sides[2]))
+    found, stand = collect_hiders(state, buildings, 0, reach, bodies, walls)
+    for actor in range(1, kind.size):
+        if kind[actor] == _ABSENT or kind[actor] >= _PROP:
+            continue
+        if abs(state.z[actor] - state.z[0]) > LEVEL_M:
+            continue
+        ahead, right = to_local(state.x[actor], state.y[actor], pose[0], pose[1], pose[2])
+        if not (sides[0] <= ahead < sides[1] and sides[2] <= right < sides[3]):
+            continue
+        fill_obstacle(state, actor, pose, out[n])
+        if is_hidden(state, buildings, 0, actor, bodies[:found], walls[:stand]):
+            out[n, 8] = 0.0
+        n += 1
+    return n
+
+
+@kernel
+def governing_line(state: State, lanes: Lanes, signals: Signals) -> int:
+    """The stop line at which the ego's own lane ends next, -1 for none.
+
+    It is looked for along the lane and those that it leads to, up to where there is a choice:
+    which way the ego will take cannot be seen. Inside a junction lanes that part lie on each other,
+    so nothing governs there before the ego has left it, nor against the lane's direction. A line of
+    a sign to yield does not count.
+    """
+    here = (state.x[0], state.y[0], state.z[0])
+    found = nearest_driving_lane_towards(lanes, here[0], here[1], here[2], state.yaw[0], ON_LANE_M)
+    lane = as_int64(found.lane)
+    if lane < 0 or (lanes.junction[lane] >= 0 and _is_one_of_several(lanes, lane)):
+        return as_int64(-1)
+    if math.cos(pose_at(lanes, lane, found.station_m)[3] - state.yaw[0]) <= 0.0:
+        return as_int64(-1)
+    ahead = lanes.length_m[lane] - found.station_m
+    while ahead <= SIGNAL_AHEAD_M:
+        line = lanes.stop_line[lane]
+        if line >= 0:
+            kind = signals.kind[signals.stop_signal[line]]
+            return as_int64(line) if kind in (_LIGHT, _STOP) else as_int64(-1)
+        first = lanes.successor_start[lane]
+        if lanes.successor_start[lane + 1] != first + 1:
+            break
+        lane = as_int64(lanes.successor[first])
+        ahead += lanes.length_m[lane]
+    return as_int64(-1)
+
+
+@kernel
+def _is_one_of_several(lanes: Lanes, lane: int) -> bool:
+    """Whether a lane begins where another one begins, too."""
+    for n in range(lanes.predecessor_start[lane], lanes.predecessor_start[lane + 1]):
+        before = lanes.predecessor[n]
+        if lanes.successor_start[before + 1] - lanes.successor_start[before] > 1:
+            return True
+    return False
+
+
+@kernel
+def _fill_signal(state: State, signals: Signals, line: int, out: Float32) -> None:
+    """One stop line, (8,): its place as the ego sees it, and what its signal shows."""
+    pose = signals.stop_pose[line]
+    out[0], out[1] = to_local(pose[0], pose[1], state.x[0], state.y[0], state.yaw[0])
+    out[2] = wrap_angle(pose[3] - state.yaw[0])
+    signal = signals.stop_signal[line]
+    if signals.kind[signal] == _STOP:
+        out[6] = 1.0
+    elif state.light[signal] == _RED:
+        out[3] = 1.0
+    elif state.light[signal] == _YELLOW:
+        out[4] = 1.0
+    elif state.light[signal] == _GREEN:
+        out[5] = 1.0
+    out[7] = 1.0
