@@ -34,13 +34,12 @@ from agents.driveinsight.perception_losses import (
 from agents.driveinsight.weights import save_pretrained
 from agents.training.config import TrainingError
 from agents.training.frames import RecordedDrive, read_drive
-from agents.training.loading import PREFETCHED, begin_worker, load_moments
+from agents.training.loading import PREFETCHED, begin_worker, load_moments, town_of
 from agents.training.loading import Moments as Chosen
 from agents.training.log import append_row, forget_rows_after
 from agents.training.perception_metrics import figures, perception_sums
 from agents.training.predictions import on_device
 from agents.training.sequences import Moments, SequenceRenderer, joined
-from agents.training.towns import load_training_town
 from agents.training.variation import Variation
 from di_envs.differences import differences
 from di_envs.files.json_values import to_json
@@ -140,14 +139,8 @@ class Sequences(Dataset[Moments]):
     def _renderer(self, drive: RecordedDrive) -> SequenceRenderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            loaded, plans = load_training_town(town)
-            if loaded.content_hash != drive.facts["town_hash"]:
-                raise TrainingError(
-                    f"the drives in {town} were made on another version of that town: collect them "
-                    f"again into an empty folder"
-                )
             depth = self._training.weights.depth > 0.0 and self._policy.camera is not None
-            self._renderers[town] = SequenceRenderer(self._policy, loaded, plans, depth=depth)
+            self._renderers[town] = SequenceRenderer(self._policy, *town_of(drive), depth=depth)
         return self._renderers[town]
 
 

@@ -8,7 +8,7 @@ expert's true path as the way back.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,9 +43,10 @@ class Sample:
 class Renderer:
     """Renders samples of one town with one policy's sensors. Towns are loaded once a process."""
 
-    def __init__(self, config: PolicyConfig, town: Town, plans: Sequence[RoutePlan]) -> None:
-        self.config, self._town = config, town
-        self._plans = {plan.route_id: plan for plan in plans}
+    def __init__(
+        self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan]
+    ) -> None:
+        self.config, self._town, self._plan_of = config, town, plan_of
         self._rig = None if config.camera is None else rig_of(config.camera.rig)
         self._stages = functools.lru_cache(64)(self._stage)
 
@@ -72,7 +73,7 @@ class Renderer:
         return Sample(inputs=tuple(inputs), targets=self._targets(drive, last, stage))
 
     def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
-        plan = self._plans[route_id]
+        plan = self._plan_of(route_id)
         lidar = self.config.lidar.lidar if self.config.lidar else "paper"
         observer = Observer(
             self._town,

@@ -7,7 +7,7 @@ where it drove, the same at all its moments.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -55,15 +55,15 @@ class SequenceRenderer:
     Args:
         config: The policy.
         town: Where.
-        plans: Its routes.
+        plan_of: Plans its routes by their ids.
         depth: Whether depths of pixels are wanted as targets.
     """
 
     def __init__(
-        self, config: PolicyConfig, town: Town, plans: Sequence[RoutePlan], *, depth: bool
+        self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan], *, depth: bool
     ) -> None:
         self.config, self._town, self._depth = config, town, depth
-        self._plans = {plan.route_id: plan for plan in plans}
+        self._plan_of = plan_of
         rig = None if config.camera is None else rig_of(config.camera.rig)
         self._rig = None if rig is None else replace(rig, depth=depth)
         self._groups = () if rig is None else image_groups(rig)
@@ -99,7 +99,7 @@ class SequenceRenderer:
             cameras=self._rig or "small",
             lidar=config.lidar.lidar if config.lidar else "paper",
         )
-        stage = DriveStage(self._town, self._plans[route_id], capacity)
+        stage = DriveStage(self._town, self._plan_of(route_id), capacity)
         observer.start(stage.view)  # once: its kernels are looked up in it, which takes a while
         return stage, observer
 

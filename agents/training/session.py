@@ -175,7 +175,8 @@ def chosen_precision(name: str, device: str) -> str:
     if device.startswith("cuda"):
         fast = torch.cuda.is_bf16_supported(including_emulation=False)
     else:
-        fast = torch.cpu.get_capabilities().get("amx_bf16", False)
+        built_in = torch.cpu.get_capabilities()
+        fast = built_in.get("amx_bf16", False) or built_in.get("avx512_bf16", False)
     return "bfloat16" if fast else "float32"
 
 
