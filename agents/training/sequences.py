@@ -28,6 +28,7 @@ from di_envs.observer import Observer
 from di_envs.sensors.camera.config import CameraConfig, Rig, rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.state import Capacity
 
 LAMP_STRIDE = 4  # pixels of an image to one of the map of lamps
 
@@ -39,7 +40,7 @@ class Moments:
     Attributes:
         images: For each size of image (B*T, N, 3, H, W) uint8; empty without cameras.
         points: (B*T, P, 4); None without LiDAR.
-        poses: (B*T, 3) odometry.
+        poses: (B*T, 3) x, y [m], yaw [rad] of the ego, in a frame of each sequence's own.
         targets: What is there at each.
     """
 
@@ -63,11 +64,13 @@ class SequenceRenderer:
         self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan], *, depth: bool
     ) -> None:
         self.config, self._town, self._depth = config, town, depth
+        # A stage needs a plan, but no sensor shows it: so any will do, and one stage for all drives
         self._plan_of = plan_of
+        self._plan: RoutePlan | None = None
         rig = None if config.camera is None else rig_of(config.camera.rig)
         self._rig = None if rig is None else replace(rig, depth=depth)
         self._groups = () if rig is None else image_groups(rig)
-        self._stages = functools.lru_cache(64)(self._stage)
+        self._stages = functools.lru_cache(4)(self._stage)
 
     def sequence(
         self, drive: RecordedDrive, last: int, length: int, variation: Variation, key: int
@@ -82,28 +85,34 @@ class SequenceRenderer:
             key: Of all draws: equal keys give equal sequences.
         """
         right_m, turn_rad, weather = drawn(variation, key)
-        stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
+        if self._plan is None:
+            self._plan = self._plan_of(str(drive.facts["route_id"]))
+        stage, observer = self._stages(drive.capacity)
         observer.change_weather(weather)
         first = max(last - length + 1, 0)
-        moments = []
+        moments, origin = [], drive.poses()[first, :2]
         for moment in range(first, first + length):
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
-            moments.append(self._moment(stage, observer.observe()))
+            moments.append(self._moment(stage, observer.observe(), origin))
         return joined(moments)
 
-    def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
+    def _stage(self, capacity: Capacity) -> tuple[DriveStage, Observer]:
         config = self.config
         observer = Observer(
             self._town,
-            tuple(group for group in config.observations if group != "prompt"),
+            tuple(group for group in config.observations if group in ("camera", "lidar")),
             cameras=self._rig or "small",
             lidar=config.lidar.lidar if config.lidar else "paper",
         )
-        stage = DriveStage(self._town, self._plan_of(route_id), capacity)
+        assert self._plan is not None
+        stage = DriveStage(self._town, self._plan, capacity)
         observer.start(stage.view)  # once: its kernels are looked up in it, which takes a while
         return stage, observer
 
-    def _moment(self, stage: DriveStage, shown: Mapping[str, Any]) -> Moments:
+    def _moment(
+        self, stage: DriveStage, shown: Mapping[str, Any], origin: NDArray[np.float64]
+    ) -> Moments:
+        """What is shown and what is there; poses are told from an origin (2,), world frame."""
         view, grid = stage.view, self.config.grid
         objects, signals = seen_truth(view, grid)
         semantics = bev_semantics(view, grid)
@@ -113,7 +122,7 @@ class SequenceRenderer:
             camera = sharpest(self._rig)
             lamps = torch.from_numpy(governing_lamps(view, camera, LAMP_STRIDE))[None]
         state = view.state
-        pose = np.array([[state.x[0], state.y[0], state.yaw[0]]], np.float32)
+        pose = np.array([state.x[0] - origin[0], state.y[0] - origin[1], state.yaw[0]], np.float32)
         signal = signals[:1] if len(signals) else np.zeros((1, SIGNAL_COLUMNS), np.float32)
         return Moments(
             images=tuple(
@@ -121,7 +130,7 @@ class SequenceRenderer:
                 for group in self._groups
             ),
             points=torch.from_numpy(shown["lidar"])[None] if self.config.lidar else None,
-            poses=torch.from_numpy(shown["odometry"] if "odometry" in shown else pose[0])[None],
+            poses=torch.from_numpy(pose)[None],
             targets=PerceptionTargets(
                 semantics=torch.from_numpy(semantics)[None],
                 objects=torch.from_numpy(objects)[None],

@@ -81,7 +81,8 @@ def run_perceive(run: StageRun) -> Made | None:
         about = f"loss {terms['total']:.2f}, {rate:.1f} moments/s"
         run.tell(Progress(done=step, total=settings.steps, unit="steps", about=about))
 
-    config = settings.training(run.seed, chosen_precision(settings.precision, device))
+    precision = chosen_precision(settings.precision, device, convolves=True)
+    config = settings.training(run.seed, precision)
     done = perceive(
         policy,
         config,

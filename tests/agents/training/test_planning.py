@@ -24,9 +24,7 @@ from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
 from tests.agents.training.small_policies import SEEING
 
-POLICY: PolicyConfig = dataclasses.replace(
-    SEEING, grid=config_named("driveinsight").grid, lidar=None
-)
+POLICY = dataclasses.replace(SEEING, grid=config_named("driveinsight").grid, lidar=None)
 SHORT = TrainConfig(
     **{**PLANNING, "measured_moments": 8, "measured_every": 20},
     steps=30,
