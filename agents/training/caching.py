@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.driveinsight.config import GridConfig
 from agents.driveinsight.seen import OBJECT_COLUMNS, OBJECTS, SIGNAL_COLUMNS, SIGNALS
+from agents.networks.grid import GridConfig
 from agents.training.config import TrainingError
 from agents.training.frames import DriveStage, RecordedDrive, read_drive
-from agents.training.loading import Moments, TownShelf
+from agents.training.loading import Moments, town_of
 from agents.training.truth import seen_truth
 from agents.training.waypoints import expert_waypoints
 from di_envs.files.whole import write_whole
@@ -87,9 +87,9 @@ def truly_seen(
 class MomentReader:
     """Reads moments of drives in one town."""
 
-    def __init__(self, town: Town, plans: tuple[RoutePlan, ...], grid: GridConfig) -> None:
+    def __init__(self, town: Town, plan_of: Callable[[str], RoutePlan], grid: GridConfig) -> None:
         self._town, self._grid = town, grid
-        self._plans = {plan.route_id: plan for plan in plans}
+        self._plan_of = plan_of
         self._stages: dict[Any, tuple[DriveStage, Observer]] = {}
 
     def read(self, drive: RecordedDrive, moment: int, out: NDArray[np.void]) -> None:
@@ -109,7 +109,7 @@ class MomentReader:
         key = (route_id, capacity)
         if key not in self._stages:
             self._stages.clear()  # drives come one after the other
-            stage = DriveStage(self._town, self._plans[route_id], capacity)
+            stage = DriveStage(self._town, self._plan_of(route_id), capacity)
             observer = Observer(self._town, ("prompt",))
             observer.start(stage.view)
             self._stages[key] = (stage, observer)
@@ -162,12 +162,11 @@ def _encoded(
     moments: Moments, grid: GridConfig, on_moment: Callable[[int], None]
 ) -> NDArray[np.void]:
     rows = np.zeros(len(moments), MOMENT)
-    readers, shelf = dict[str, MomentReader](), TownShelf()
+    readers = dict[str, MomentReader]()
     for number in np.unique(moments.drive):
         drive = read_drive(moments.paths[number])
         name = str(drive.facts["town"])
-        town, plans = shelf.of(drive)
-        reader = readers.setdefault(name, MomentReader(town, plans, grid))
+        reader = readers.setdefault(name, MomentReader(*town_of(drive), grid))
         for row in np.flatnonzero(moments.drive == number):
             reader.read(drive, int(moments.moment[row]), rows[row])
         on_moment(int((moments.drive <= number).sum()))

@@ -10,8 +10,9 @@ import atexit
 import hashlib
 import os
 import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
-from agents.training.towns import load_training_town
+from agents.training.towns import training_plan, training_town
 from agents.training.variation import Variation
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
 from di_envs.town.plan import RoutePlan
@@ -153,27 +154,20 @@ def _moments_of(drive: RecordedDrive, standing_share: float) -> Iterator[int]:
             yield moment
 
 
-class TownShelf:
-    """Training towns, loaded when they are first wanted and kept."""
+def town_of(drive: RecordedDrive) -> tuple[Town, Callable[[str], RoutePlan]]:
+    """The town of a drive, and what plans its routes by their ids.
 
-    def __init__(self) -> None:
-        self._towns: dict[str, tuple[Town, tuple[RoutePlan, ...]]] = {}
-
-    def of(self, drive: RecordedDrive) -> tuple[Town, tuple[RoutePlan, ...]]:
-        """The town of a drive, and its routes planned.
-
-        Raises:
-            TrainingError: If the drive was made on another version of it.
-        """
-        name = str(drive.facts["town"])
-        if name not in self._towns:
-            self._towns[name] = load_training_town(name)
-        if self._towns[name][0].content_hash != drive.facts["town_hash"]:
-            raise TrainingError(
-                f"the drives in {name} were made on another version of that town: collect them "
-                f"again into an empty folder"
-            )
-        return self._towns[name]
+    Raises:
+        TrainingError: If the drive was made on another version of it.
+    """
+    name = str(drive.facts["town"])
+    town = training_town(name)
+    if town.content_hash != drive.facts["town_hash"]:
+        raise TrainingError(
+            f"the drives in {name} were made on another version of that town: collect them again "
+            f"into an empty folder"
+        )
+    return town, partial(training_plan, name)
 
 
 class Samples(Dataset[Sample]):
@@ -192,7 +186,6 @@ class Samples(Dataset[Sample]):
         self._measured = kept_out.some(training.measured)
         self._drives: dict[int, RecordedDrive] = {}
         self._renderers: dict[str, Renderer] = {}
-        self._towns = TownShelf()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what it is made from, without what it has read."""
@@ -233,7 +226,7 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            self._renderers[town] = Renderer(self._config, *self._towns.of(drive))
+            self._renderers[town] = Renderer(self._config, *town_of(drive))
         return self._renderers[town]
 
 
@@ -280,7 +273,7 @@ def batches(
         sampler=order(training, first_step, share),
         collate_fn=batch_of,
         num_workers=workers,
-        worker_init_fn=_begin_worker,
+        worker_init_fn=begin_worker,
         **ahead,
     )
     try:
@@ -290,7 +283,7 @@ def batches(
         raise TrainingError(last.rpartition("Error: ")[2]) from error
 
 
-def _begin_worker(_: int) -> None:
+def begin_worker(_: int) -> None:
     """Lets the process that trains stop its workers, when it has saved.
 
     A worker leaves without tidying its interpreter up: torch may still be sending a batch that

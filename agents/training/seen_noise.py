@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.driveinsight.config import GridConfig
 from agents.driveinsight.seen import OBJECTS, SIGNALS
+from agents.networks.grid import GridConfig
 from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 from di_envs.world.kinds import ActorKind
 

@@ -1,7 +1,11 @@
-"""`driveinsight train`: trains a policy on collected drives; goes on where it was stopped."""
+"""`driveinsight train`: trains a policy on collected drives, or does all that a recipe says.
+
+Either goes on where it was stopped.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +16,17 @@ import tyro
 from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.recipe import run_recipe_file
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
     from agents.training.session import Session, TrainingPlan
 
-TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
+TRAIN_HELP = """Train a policy on what `driveinsight collect` kept, or from nothing by a recipe.
 
 Examples:
+  driveinsight train --recipe recipes/tiny.toml                      from nothing, in ten minutes
+  driveinsight train --recipe recipes/driveinsight.toml --list       its stages, and how they stand
   driveinsight train --config tiny --steps 1500 --check-routes 2     a first try, in minutes
   driveinsight train --config driveinsight --data data --output runs/driveinsight
   driveinsight train --plan-only --batch 128 --steps 20000           the planner alone, first
@@ -27,15 +34,32 @@ Examples:
   driveinsight train --overfit 1 --steps 300                         can it learn at all?
   torchrun --nproc-per-node 4 -m leaderboard train                   four processes, or GPUs
 
-Pictures are rendered while it trains, each sample in a weather of its own. Into --output go a
-checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores of routes that
-it drives on the way, and in policy/ the weights that drove best. After Ctrl-C or a crash the same
-command goes on, and comes to the same bits (on a CPU)."""
+A recipe names stages: collecting, training, rounds of corrections. Each has a folder in --output;
+cut off anywhere, the same command goes on.
+
+Without one, pictures are rendered while it trains, each sample in a weather of its own. Into
+--output go a checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores
+of routes that it drives on the way, and in policy/ the weights that drove best. After Ctrl-C or a
+crash the same command goes on, and comes to the same bits (on a CPU)."""
+
+
+# What can be said beside a recipe
+_OF_RECIPES = ("recipe", "stage", "listed", "output", "workers", "device")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
     """The arguments of `driveinsight train`."""
+
+    recipe: Annotated[Path | None, says("FILE", "none")] = None
+    """A file that names all stages from nothing to the weights; beside it only --output, --stage,
+    --list, --workers and --device can be said."""
+
+    stage: Annotated[str | None, says("NAME", "the recipe's last")] = None
+    """With --recipe: the last stage to do."""
+
+    listed: Annotated[bool, tyro.conf.arg(name="list")] = False
+    """With --recipe: do nothing, show its stages, which are done, what they took."""
 
     config: Annotated[str, says("NAME", "driveinsight")] = "driveinsight"
     """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …"""
@@ -50,7 +74,7 @@ class Train:
     data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
     """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""
 
-    output: Annotated[Path | None, says("DIR", "runs/CONFIG")] = None
+    output: Annotated[Path | None, says("DIR", "runs/CONFIG, or runs/RECIPE")] = None
     """Folder for all that is written."""
 
     steps: Annotated[int, says("N", "4000")] = 4000
@@ -68,7 +92,7 @@ class Train:
 
     workers: Annotated[int | None, says("N", "cores - 1")] = None
     """Processes that render samples; 0 renders between steps. The bits are the same. With torchrun:
-    of each of its processes."""
+    of each of its processes. With --recipe: processes that drive or render (2 by default)."""
 
     threads: Annotated[int, says("N", "1")] = 1
     """Threads of torch on a CPU; another number gives other bits."""
@@ -107,6 +131,18 @@ class Train:
             raise UsageError(
                 f"training needs torch: pip install 'driveinsight[policy]' ({error})"
             ) from error
+        if self.recipe is not None:
+            self._check_alone()
+            return run_recipe_file(
+                self.recipe,
+                self.output or Path("runs") / self.recipe.stem,
+                until=self.stage,
+                listed=self.listed,
+                workers=self.workers,
+                device=self.device,
+            )
+        if self.stage is not None or self.listed:
+            raise UsageError("--stage and --list are of a recipe: add --recipe FILE")
         self._check_numbers()
 
         from agents.driveinsight.weights import WeightsError
@@ -126,6 +162,17 @@ class Train:
         if session.training.team.first:
             (_tell_trained if done else _tell_stopped)(session)
         return 0 if done else EXIT_INTERRUPTED
+
+    def _check_alone(self) -> None:
+        """Refuses what the recipe says itself."""
+        for field in dataclasses.fields(self):
+            said = getattr(self, field.name) != field.default
+            if said and field.name not in _OF_RECIPES:
+                option = field.name.replace("_", "-")
+                raise UsageError(
+                    f"--{option} is for a training without --recipe: a recipe says it, stage by "
+                    f"stage, in its file"
+                )
 
     def _check_numbers(self) -> None:
         if self.check_every is not None and self.check_every < 1:

@@ -13,7 +13,7 @@ from agents.training.caching import MOMENT, cached
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import DriveStage, read_drive
 from agents.training.learning import Training
-from agents.training.loading import TownShelf, load_moments
+from agents.training.loading import load_moments, town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
 from agents.training.planning import PlanningSamples, set_aside
@@ -53,8 +53,8 @@ def test_a_moment_takes_five_kilobytes(cache):
 def test_what_is_encoded_and_set_aside_is_what_would_be_observed_there(cache, monkeypatch):
     row, right_m, turn_rad = len(cache.rows) // 3, 0.7, -0.1
     drive = read_drive(cache.moments.paths[cache.moments.drive[row]])
-    town, plans = TownShelf().of(drive)
-    plan = next(plan for plan in plans if plan.route_id == drive.facts["route_id"])
+    town, plan_of = town_of(drive)
+    plan = plan_of(drive.facts["route_id"])
     stage, observer = DriveStage(town, plan, drive.capacity), Observer(town, ("prompt",))
     observer.start(stage.view)
     moment = int(cache.moments.moment[row])
