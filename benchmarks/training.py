@@ -23,7 +23,7 @@ from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments
 
 TOWNS = ("small_grid", "suburb")
-CONFIGS = ("small", "small-prompt-only", "tiny")
+CONFIGS = ("driveinsight", "driveinsight-told", "tiny")
 DRIVES = 8  # of each town
 BATCH = 16
 

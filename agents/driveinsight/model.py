@@ -7,7 +7,8 @@
     prompt -> PromptEncoder ---------------------------------------------------------+
 
 `forward` is a pure function of its inputs: what is hidden in training comes in as `present`, and
-what is remembered comes in and goes out as a `MemoryBank`.
+what is remembered comes in and goes out as a `MemoryBank`. Who hands in rows that are `seen` needs
+no sensors: so the planner learns at hundreds of samples a second.
 """
 
 from __future__ import annotations
@@ -18,14 +19,16 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.driveinsight.bev_tokens import BevTokens
 from agents.driveinsight.camera import CameraEncoder
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.fusion import MultiModalFusion
 from agents.driveinsight.lidar import LidarEncoder
 from agents.driveinsight.memory import MemoryBank, TemporalFusion, empty_bank
-from agents.driveinsight.planner import BevTokens, Planner
+from agents.driveinsight.planner import Planner
+from agents.driveinsight.seen import Seen
 from agents.driveinsight.semantics import BevClass
-from agents.driveinsight.tokens import PromptEncoder
+from agents.driveinsight.tokens import PromptEncoder, told_route
 from agents.networks.taps import Tap
 from di_envs.prompt import COMPONENTS
 
@@ -40,6 +43,7 @@ class Inputs:
         images: (B, N, 3, H, W) RGB, 0..255; None without cameras.
         points: (B, P, 4); None without LiDAR.
         pose: (B, 3) odometry; None without a memory.
+        seen: Rows to plan by instead of those that the policy's own eyes would see; None to look.
     """
 
     prompt: Mapping[str, Tensor]
@@ -47,6 +51,7 @@ class Inputs:
     images: Tensor | None = None
     points: Tensor | None = None
     pose: Tensor | None = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +77,7 @@ class Policy(nn.Module):
     def __init__(self, config: PolicyConfig) -> None:
         super().__init__()
         self.config = config
-        width, cells = config.bev_width, config.grid.cells
+        width = config.bev_width
         self.camera = CameraEncoder(config.camera, config.grid) if config.camera else None
         self.lidar = LidarEncoder(config.lidar, config.grid) if config.lidar else None
         channels = [part.channels for part in (config.camera, config.lidar) if part is not None]
@@ -83,8 +88,8 @@ class Policy(nn.Module):
             else None
         )
         self.semantics = nn.Conv2d(width, len(BevClass), 1) if channels else None
-        self.bev = BevTokens(width, cells, config.planner) if channels else None
-        self.prompt = PromptEncoder(config.planner.width)
+        self.bev = BevTokens(width, config.grid, config.planner) if channels else None
+        self.prompt = PromptEncoder(config.planner)
         self.planner = Planner(config.planner)
         self.waypoints = Tap()
         given = torch.tensor([float(name in config.prompt) for name in COMPONENTS])
@@ -102,17 +107,40 @@ class Policy(nn.Module):
             bank: What is remembered; None is an empty bank.
         """
         present = inputs.present * self.given
-        tokens = self.prompt(inputs.prompt, present[:, : len(COMPONENTS)])
         if self.bev is None or self.semantics is None:
-            return Output(waypoints=self.waypoints(self.planner(tokens, None, None)))
+            return Output(waypoints=self.plan(inputs.prompt, present, None, None))
+        if inputs.seen is not None:
+            return Output(waypoints=self.plan(inputs.prompt, present, inputs.seen, None))
         bev, depth = self.see(inputs, bank)
-        patches = self.bev(bev, present[:, TOKENS.index("bev")])
+        seen = Seen.nothing(len(bev), device=bev.device)
         return Output(
-            waypoints=self.waypoints(self.planner(tokens, patches, self.bev.place)),
+            waypoints=self.plan(inputs.prompt, present, seen, bev),
             bev=bev,
             semantics=self.semantics(bev),
             depth=depth,
         )
+
+    def plan(
+        self, prompt: Mapping[str, Tensor], present: Tensor, seen: Seen | None, bev: Tensor | None
+    ) -> Tensor:
+        """Waypoints from what is told and what is seen.
+
+        Args:
+            prompt: The components by name.
+            present: (B, 10) 0 or 1 in the order of `TOKENS`.
+            seen: Rows that are seen; None for a policy without sensors.
+            bev: (B, C, X, Y) features; None where there are rows alone.
+
+        Returns:
+            (B, T, 2) x ahead, y right [m].
+        """
+        tokens = self.prompt(prompt, present[:, : len(COMPONENTS)])
+        if self.bev is not None and seen is not None:
+            route = told_route(prompt, present)
+            there = present[:, TOKENS.index("bev")]
+            tokens.append(self.bev(seen, bev, route, there, self.prompt))
+        waypoints: Tensor = self.waypoints(self.planner(tokens))
+        return waypoints
 
     def see(self, inputs: Inputs, bank: MemoryBank | None) -> tuple[Tensor, Tensor | None]:
         """Fused BEV features, and the depth logits where there are cameras."""

@@ -22,3 +22,16 @@ class DecoderLayer(nn.Module):
         """(B, Q, width) and (B, T, width) to (B, Q, width)."""
         query = query + self.attention(self.norm1(query), tokens)
         return query + self.mix(self.norm2(query))
+
+
+class MixingLayer(nn.Module):
+    """Self-attention and an MLP, each with a shortcut."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.layer = DecoderLayer(width, heads)
+
+    def forward(self, tokens: Tensor) -> Tensor:
+        """(B, T, width) to the same shape."""
+        mixed: Tensor = self.layer(tokens, self.layer.norm1(tokens))
+        return mixed

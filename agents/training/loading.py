@@ -10,7 +10,7 @@ import atexit
 import hashlib
 import os
 import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,8 @@ from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import training_plan, training_town
 from agents.training.variation import Variation
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
+from di_envs.town.plan import RoutePlan
+from di_envs.town.town import Town
 
 STANDING_MPS = 0.1
 PREFETCHED = 4  # batches that each process renders ahead
@@ -67,13 +69,19 @@ class Moments:
         return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
 
     def held_out(self, share: float) -> tuple[Moments, Moments]:
-        """Those to learn from, and those of the drives kept out: at least one, at most half.
+        """Those to learn from, and those of the drives kept out; see `held_out_rows`."""
+        taught, kept_out = self.held_out_rows(share)
+        return self._rows(taught), self._rows(kept_out)
+
+    def held_out_rows(self, share: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which of them to learn from, and which are of drives kept out: one to half of these.
 
         Raises:
             TrainingError: If there are too few drives for that.
         """
+        every = np.arange(len(self))
         if not share:
-            return self, self._rows(np.zeros(0, np.int64))
+            return every, every[:0]
         drives = np.unique(self.drive)
         draws = self.draws[drives]
         count = min(max(int((draws < share).sum()), 1), len(drives) // 2)
@@ -83,7 +91,7 @@ class Moments:
                 "there is one drive alone, so none can be kept out of training to measure by: "
                 "collect more, or give --held-out 0"
             )
-        return self._rows(np.flatnonzero(~kept_out)), self._rows(np.flatnonzero(kept_out))
+        return every[~kept_out], every[kept_out]
 
     def _rows(self, rows: NDArray[np.int64]) -> Moments:
         return replace(self, drive=self.drive[rows], moment=self.moment[rows])
@@ -146,6 +154,22 @@ def _moments_of(drive: RecordedDrive, standing_share: float) -> Iterator[int]:
             yield moment
 
 
+def town_of(drive: RecordedDrive) -> tuple[Town, Callable[[str], RoutePlan]]:
+    """The town of a drive, and what plans its routes by their ids.
+
+    Raises:
+        TrainingError: If the drive was made on another version of it.
+    """
+    name = str(drive.facts["town"])
+    town = training_town(name)
+    if town.content_hash != drive.facts["town_hash"]:
+        raise TrainingError(
+            f"the drives in {name} were made on another version of that town: collect them again "
+            f"into an empty folder"
+        )
+    return town, partial(training_plan, name)
+
+
 class Samples(Dataset[Sample]):
     """Samples by their number over the whole training: step x batch + place in it.
 
@@ -202,13 +226,7 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            loaded = training_town(town)
-            if loaded.content_hash != drive.facts["town_hash"]:
-                raise TrainingError(
-                    f"the drives in {town} were made on another version of that town: collect them "
-                    f"again into an empty folder"
-                )
-            self._renderers[town] = Renderer(self._config, loaded, partial(training_plan, town))
+            self._renderers[town] = Renderer(self._config, *town_of(drive))
         return self._renderers[town]
 
 

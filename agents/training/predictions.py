@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import torch
@@ -51,12 +52,14 @@ def look(
 
 
 def _to(values: Any, device: torch.device) -> Any:
-    """A bundle of tensors on a device."""
-
-    def moved(value: Any) -> Any:
-        if isinstance(value, Tensor):
-            return value.to(device, non_blocking=True)
-        return {name: moved(item) for name, item in value.items()} if value else value
-
+    """A bundle of tensors, of mappings of them or of other bundles, on a device."""
+    if isinstance(values, Tensor):
+        return values.to(device, non_blocking=True)
+    if isinstance(values, Mapping):
+        return {name: _to(item, device) for name, item in values.items()}
+    if values is None:
+        return None
     fields = dataclasses.fields(values)
-    return type(values)(**{field.name: moved(getattr(values, field.name)) for field in fields})
+    return type(values)(
+        **{field.name: _to(getattr(values, field.name), device) for field in fields}
+    )

@@ -26,7 +26,8 @@ from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
-from di_envs.numerics.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_arrays import keyed_uniforms
+from di_envs.numerics.keyed_random import Stream
 from di_envs.observer import Observer
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.town.plan import RoutePlan
@@ -183,14 +184,16 @@ def _joined_targets(parts: Sequence[Targets]) -> Targets:
 
 def hidden_components(config: PolicyConfig, batch: int, key: int) -> Tensor:
     """(B, 10) 0 where training hides a component of a sample, by the rates of the config."""
-    rates = np.array([config.planner.dropout.get(name, 0.0) for name in TOKENS])
-    draws = np.array(
-        [
-            [
-                float(uniform(key, int(Stream.AGENT), n, component))
-                for component in range(len(TOKENS))
-            ]
-            for n in range(batch)
-        ]
-    )
-    return torch.from_numpy((draws >= rates).astype(np.float32))
+    rates = [config.planner.dropout.get(name, 0.0) for name in TOKENS]
+    given = keyed_uniforms(key, int(Stream.AGENT), 0, (batch, len(TOKENS))) >= np.array(rates)
+    for group, (names, rate) in enumerate(config.planner.together.items()):
+        hidden = keyed_uniforms(key, int(Stream.AGENT), 1 + group, (batch,)) < rate
+        for name in names.split("+"):
+            given[hidden, TOKENS.index(name)] = False
+    return torch.from_numpy(given.astype(np.float32))
+
+
+def without(names: str, batch: int) -> Tensor:
+    """(B, 10) 0 where a component is among names that are joined by '+'; '' is none."""
+    hidden = names.split("+")
+    return torch.tensor([[float(name not in hidden) for name in TOKENS]]).expand(batch, -1)

@@ -17,12 +17,14 @@ import torch
 
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.weights import take_weights, weights_digest
+from agents.training.caching import cached
 from agents.training.collect import data_card
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import Team, joined_team
 from agents.training.learning import Training
 from agents.training.loading import Moments, Samples, batches, load_moments
 from agents.training.loop import CHECKPOINT_FILE
+from agents.training.planning import PlanningSamples
 from agents.training.samples import Batch
 
 
@@ -39,6 +41,7 @@ class TrainingPlan:
         device: `cpu`, `cuda`, or `auto`: a GPU if there is one.
         precision: `float32`, `bfloat16`, or `auto`: bfloat16 where the hardware has it built in.
         workers: Processes that render samples; None for the cores that are left.
+        cache: Where moments are kept encoded when nothing is rendered.
     """
 
     policy: PolicyConfig
@@ -49,6 +52,7 @@ class TrainingPlan:
     device: str = "auto"
     precision: str = "auto"
     workers: int | None = None
+    cache: Path = Path("cache")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +70,7 @@ class Session:
 
     plan: TrainingPlan
     training: Training
-    samples: Samples
+    samples: Samples | PlanningSamples
     resumed: bool
     taken: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
@@ -74,12 +78,19 @@ class Session:
     def batches(self) -> Generator[Batch, None, None]:
         """What it learns from, from its step on."""
         team, workers = self.training.team, self.plan.workers
+        if isinstance(self.samples, PlanningSamples):
+            return self.samples.batches(self.training.step, team)
         return batches(
             self.samples,
             first_step=self.training.step,
             workers=free_cores(team) if workers is None else workers,
             team=team,
         )
+
+    def warm_up(self) -> None:
+        """Renders a sample, so that kernels are compiled before several processes need them."""
+        if isinstance(self.samples, Samples):
+            self.samples[0]
 
     def about_data(self) -> Mapping[str, Any]:
         """The data card of each folder."""
@@ -106,7 +117,7 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
     moments = load_moments(plan.data, plan.training.standing_share)
     config = _filled_in(plan, moments, team, device, digest)
     training = Training.begin(plan.policy, config, device, team)
-    samples = Samples(plan.policy, config, moments)
+    samples = _samples(plan, config, moments, team)
     checkpoint = plan.folder / CHECKPOINT_FILE
     if checkpoint.exists():
         training.load(checkpoint)
@@ -118,6 +129,18 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
     return Session(
         plan=plan, training=training, samples=samples, resumed=False, taken=taken, left=left
     )
+
+
+def _samples(
+    plan: TrainingPlan, config: TrainConfig, moments: Moments, team: Team
+) -> Samples | PlanningSamples:
+    """What renders moments, or what has them encoded: the first of a team encodes them."""
+    if config.rendered:
+        return Samples(plan.policy, config, moments)
+    if team.first:
+        cached(moments, plan.policy.grid, plan.cache)
+    team.any(False)  # the others wait until it is there
+    return PlanningSamples.of(plan.policy, config, cached(moments, plan.policy.grid, plan.cache))
 
 
 def _filled_in(

@@ -28,10 +28,11 @@ Examples:
   driveinsight train --recipe recipes/tiny.toml                      from nothing, in ten minutes
   driveinsight train --recipe recipes/driveinsight.toml --list       its stages, and how they stand
   driveinsight train --config tiny --steps 1500 --check-routes 2     a first try, in minutes
-  driveinsight train --config small --data data --output runs/small
-  driveinsight train --config small --init-from runs/small-prompt-only/policy
-  driveinsight train --config small --overfit 1 --steps 300          can it learn at all?
-  torchrun --nproc-per-node 4 -m leaderboard train --config small    four processes, or GPUs
+  driveinsight train --config driveinsight --data data --output runs/driveinsight
+  driveinsight train --plan-only --batch 128 --steps 20000           the planner alone, first
+  driveinsight train --init-from runs/plan/policy --planner-rate 0.3
+  driveinsight train --overfit 1 --steps 300                         can it learn at all?
+  torchrun --nproc-per-node 4 -m leaderboard train                   four processes, or GPUs
 
 A recipe names stages: collecting, training, rounds of corrections. Each has a folder in --output;
 cut off anywhere, the same command goes on.
@@ -63,8 +64,15 @@ class Train:
     listed: Annotated[bool, tyro.conf.arg(name="list")] = False
     """With --recipe: do nothing, show its stages, which are done, what they took."""
 
-    config: Annotated[str, says("NAME", "small")] = "small"
-    """Configuration of the policy: tiny, small, small-prompt-only, paper, …"""
+    config: Annotated[str, says("NAME", "driveinsight")] = "driveinsight"
+    """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …"""
+
+    plan_only: bool = False
+    """Train the planner alone, by what truly is in sight instead of pictures: hundreds of samples a
+    second. What sees stays as it is."""
+
+    cache: Annotated[Path, says("DIR", "cache")] = Path("cache")
+    """Where moments are kept encoded for --plan-only: 5 kB each, at most 100,000 of them."""
 
     data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
     """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""
@@ -181,7 +189,7 @@ class Train:
     def _plan(self) -> TrainingPlan:
         """What the arguments ask for."""
         from agents.driveinsight.config import config_named
-        from agents.training.config import TrainConfig
+        from agents.training.config import PLANNING, TrainConfig
         from agents.training.session import TrainingPlan
 
         try:
@@ -196,6 +204,7 @@ class Train:
                 overfit=self.overfit,
                 threads=self.threads,
                 held_out=self.held_out,
+                **(PLANNING if self.plan_only else {}),
             )
         except ValueError as error:
             raise UsageError(str(error)) from error
@@ -208,6 +217,7 @@ class Train:
             device=self.device,
             precision=self.precision,
             workers=self.workers,
+            cache=self.cache,
         )
 
 
@@ -237,7 +247,8 @@ def _tell_stopped(session: Session) -> None:
 
 
 def _tell_trained(session: Session) -> None:
-    from agents.training.log import HELD_OUT, read_rows, write_curve
+    from agents.training.config import HELD_OUT
+    from agents.training.log import read_rows, write_curve
     from agents.training.loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     folder = session.plan.folder

@@ -62,7 +62,7 @@ def run_training(
             session = begin(plan, team, device)
         on_begin(session)
         with compile_progress(console):
-            session.samples[0]  # before several processes need the same kernels
+            session.warm_up()
         return session, _watched(session, check)
 
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets
-from agents.driveinsight.model import Inputs, Output
+from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.semantics import BevClass
 from di_envs.prompt import LIGHTS, MAP_POLYLINES, OBSTACLES, ROUTING_POINTS, STOP_SIGNS
 from di_envs.sensors.camera.config import rig_of
@@ -53,6 +53,13 @@ def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int
         points=points,
         pose=normal(3),
     )
+
+
+def awake(policy: Policy) -> Policy:
+    """A policy whose layers that begin at zero are drawn as the others are."""
+    if policy.bev is not None:
+        torch.nn.init.normal_(policy.bev.way.out.weight, std=0.1)
+    return policy
 
 
 def random_targets(output: Output, seed: int = 0) -> Targets:

@@ -23,7 +23,7 @@ CONFIG = PolicyConfig(
     grid=GridConfig(cells=24),
     camera=CameraEncoderConfig(rig="rl", width=4, stride=4, channels=4, depth_bins=4),
     lidar=None,
-    planner=PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4),
+    planner=PlannerConfig(width=16, heads=2, layers=1),
     memory_frames=2,
     bev_width=4,
 )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
 from agents.driveinsight.agent import DriveInsightAgent
-from agents.driveinsight.config import config_named
+from agents.driveinsight.config import PolicyConfig, config_named
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
@@ -16,26 +18,26 @@ from agents.networks.taps import editing, watching
 from di_envs.edits.text import EditError, read_edits
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
-from tests.agents.driveinsight.random_inputs import random_inputs
+from tests.agents.driveinsight.random_inputs import awake, random_inputs
 from wrappers.interventions import ObservationEditing
 from wrappers.interventions.context import EditContext
 
 NOW = DecisionMoment(seed=3, decision=60, time_s=6.0)
 
 
-def made(name: str) -> Policy:
+def made(config: PolicyConfig) -> Policy:
     torch.manual_seed(0)
-    return Policy(config_named(name)).eval()
+    return awake(Policy(config)).eval()
 
 
 @pytest.fixture(scope="module")
 def prompted() -> Policy:
-    return made("small-prompt-only")
+    return made(config_named("driveinsight-told"))
 
 
 @pytest.fixture(scope="module")
 def seeing() -> Policy:
-    return made("small-without-cameras")
+    return made(dataclasses.replace(config_named("driveinsight"), camera=None))
 
 
 def read(text, policy):

@@ -10,7 +10,7 @@ from agents.driveinsight.config import (
     PolicyConfig,
 )
 
-_PLANNER = PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4)
+_PLANNER = PlannerConfig(width=16, heads=2, layers=1)
 
 PROMPT_ONLY = PolicyConfig(
     name="test-prompt-only",

@@ -18,11 +18,11 @@ from agents.driveinsight.weights import (
     weights_digest,
 )
 from agents.training.collect import drive_paths
-from agents.training.config import TrainConfig, TrainingError
+from agents.training.config import HELD_OUT, TrainConfig, TrainingError
 from agents.training.frames import DriveFileError, read_drive
 from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments
-from agents.training.log import HELD_OUT, forget_rows_after, read_rows, write_curve
+from agents.training.log import forget_rows_after, read_rows, write_curve
 from agents.training.loop import (
     CHECKPOINT_FILE,
     CHECKS_FILE,

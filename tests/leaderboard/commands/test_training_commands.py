@@ -30,7 +30,7 @@ def data(tmp_path_factory):
 def policy(data, tmp_path_factory):
     """Trained for three steps: it drives like it."""
     folder = tmp_path_factory.mktemp("run")
-    arguments = ["--config", "small-prompt-only", "--data", str(data), "--output", str(folder)]
+    arguments = ["--config", "driveinsight-told", "--data", str(data), "--output", str(folder)]
     arguments += ["--steps", "3", "--batch", "2", "--workers", "0"]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     return folder / "policy"
@@ -57,7 +57,7 @@ def test_training_leaves_a_policy_that_drove_its_log_and_its_card(policy):
 
 def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, capsys):
     before = (policy / "weights.safetensors").read_bytes()
-    arguments = ["--config", "small-prompt-only", "--data", str(data)]
+    arguments = ["--config", "driveinsight-told", "--data", str(data)]
     arguments += ["--output", str(policy.parent), "--steps", "3", "--batch", "2", "--workers", "0"]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     out = capsys.readouterr().out
@@ -67,7 +67,7 @@ def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, ca
 
 
 def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_path, capsys):
-    arguments = ["--config", "small-without-cameras", "--data", str(data), "--output"]
+    arguments = ["--config", "route-only", "--data", str(data), "--output"]
     arguments += [str(tmp_path), "--steps", "1", "--batch", "1", "--workers", "0"]
     arguments += ["--check-routes", "0", "--init-from", str(policy)]
     assert main(["train", *arguments]) == 0

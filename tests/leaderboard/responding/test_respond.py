@@ -95,7 +95,7 @@ def test_a_policy_with_sensors_and_a_memory_is_looked_at_as_it_drove_edits_and_a
         grid=GridConfig(cells=24),
         camera=CameraEncoderConfig(rig="rl", width=4, channels=4, depth_bins=4),
         lidar=None,
-        planner=PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4),
+        planner=PlannerConfig(width=16, heads=2, layers=1),
         bev_width=4,
     )
     torch.manual_seed(0)

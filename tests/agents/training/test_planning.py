@@ -1,0 +1,202 @@
+"""A planner that learns from encoded moments: what they hold, and how they vary."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from agents.driveinsight.config import TOKENS, PolicyConfig, config_named
+from agents.training.caching import MOMENT, cached
+from agents.training.config import PLANNING, TrainConfig, TrainingError
+from agents.training.frames import DriveStage, read_drive
+from agents.training.learning import Training
+from agents.training.loading import load_moments, town_of
+from agents.training.log import read_rows
+from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
+from agents.training.planning import PlanningSamples, set_aside
+from agents.training.samples import hidden_components, without
+from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
+from agents.training.variation import Variation
+from agents.training.waypoints import expert_waypoints
+from di_envs.observer import Observer
+from tests.agents.training.small_policies import SEEING
+
+POLICY: PolicyConfig = dataclasses.replace(
+    SEEING, grid=config_named("driveinsight").grid, lidar=None
+)
+SHORT = TrainConfig(
+    **{**PLANNING, "measured_moments": 8, "measured_every": 20},
+    steps=30,
+    batch=4,
+    warm_up=2,
+    held_out=0.1,
+)
+BOTH = slice(0, 4)
+
+
+@pytest.fixture(scope="module")
+def cache(drives, tmp_path_factory):
+    moments = load_moments([drives], standing_share=0.3)
+    return cached(moments, POLICY.grid, tmp_path_factory.mktemp("cache"))
+
+
+def samples_of(cache, **fields):
+    return PlanningSamples.of(POLICY, dataclasses.replace(SHORT, **fields), cache)
+
+
+def test_a_moment_takes_five_kilobytes(cache):
+    assert MOMENT.itemsize < 5000
+    assert len(cache.rows) == len(cache.moments)
+
+
+def test_what_is_encoded_and_set_aside_is_what_would_be_observed_there(cache, monkeypatch):
+    row, right_m, turn_rad = len(cache.rows) // 3, 0.7, -0.1
+    drive = read_drive(cache.moments.paths[cache.moments.drive[row]])
+    town, plan_of = town_of(drive)
+    stage = DriveStage(town, plan_of(drive.facts["route_id"]), drive.capacity)
+    observer = Observer(town, ("prompt",))
+    observer.start(stage.view)
+    moment = int(cache.moments.moment[row])
+    stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
+    there, state = observer.observe(), stage.view.state
+    samples = samples_of(cache, held_out=0.0)
+    monkeypatch.setattr(
+        "agents.training.planning.set_aside",
+        lambda *_: (np.full(4, right_m), np.full(4, turn_rad)),
+    )
+    one = dataclasses.replace(samples, taught=np.array([row]))
+    batch = one.batch(0, BOTH)
+    prompt = batch.inputs[0].prompt
+    for name in ("target_point", "routing", "speed", "speed_history"):
+        assert np.allclose(prompt[name][0], there[name], atol=0.05), name
+    assert int(prompt["command"][0, 0]) == int(np.ravel(there["command"])[0])
+    near = np.hypot(*there["obstacles"][:, :2].T) < 60.0  # the furthest may be others
+    seen = there["obstacles"][near & (there["obstacles"][:, 8] > 0.0)]
+    found = prompt["obstacles"][0].numpy()
+    gaps = np.abs(found[None, :, :2] - seen[:, None, :2]).sum(axis=2)
+    assert (gaps.min(axis=1) < 0.15).all()
+    matched = found[gaps.argmin(axis=1)]
+    assert np.allclose(np.cos(matched[:, 2] - seen[:, 2]), 1.0, atol=0.01)
+    assert np.allclose(matched[:, 3:], seen[:, 3:], atol=0.05)
+    pose = np.array([state.x[0], state.y[0], state.yaw[0]])
+    waypoints, valid = expert_waypoints(drive, moment, 8, pose)
+    assert np.allclose(batch.targets.waypoints[0], waypoints, atol=1e-3)
+    assert np.array_equal(batch.targets.valid[0], valid)
+
+
+def test_a_cache_is_read_again_and_one_cut_off_says_what_to_do(cache, drives, tmp_path):
+    moments = load_moments([drives], standing_share=0.3)
+    first = cached(moments, POLICY.grid, tmp_path)
+    assert np.array_equal(first.rows.tobytes(), cache.rows.tobytes())
+    path = next(tmp_path.iterdir())
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(TrainingError, match=r"is not whole .*delete it to encode again"):
+        cached(moments, POLICY.grid, tmp_path)
+
+
+def test_equal_steps_give_equal_batches_whatever_came_before(cache):
+    samples, again = samples_of(cache), samples_of(cache)
+    again.batch(7, BOTH)
+    one, same, other = samples.batch(3, BOTH), again.batch(3, BOTH), samples.batch(4, BOTH)
+    assert torch.equal(one.inputs[0].seen.objects, same.inputs[0].seen.objects)
+    assert torch.equal(one.targets.waypoints, same.targets.waypoints)
+    assert not torch.equal(one.targets.waypoints, other.targets.waypoints)
+
+
+def test_a_share_of_a_batch_is_its_rows(cache):
+    samples = samples_of(cache)
+    whole, half = samples.batch(3, BOTH), samples.batch(3, slice(2, 4))
+    assert torch.equal(whole.inputs[0].seen.objects[2:], half.inputs[0].seen.objects)
+    assert torch.equal(whole.targets.waypoints[2:], half.targets.waypoints)
+
+
+def run(cache, folder, stop_at=None):
+    training = Training.begin(POLICY, SHORT, "cpu")
+    if (folder / CHECKPOINT_FILE).exists():
+        training.load(folder / CHECKPOINT_FILE)
+    data = samples_of(cache).batches(training.step)
+    train(training, data, folder, stop=lambda: training.step == stop_at)
+    return training
+
+
+def test_stopped_and_gone_on_with_is_the_same_to_the_bit(cache, tmp_path):
+    whole = run(cache, tmp_path / "whole")
+    run(cache, tmp_path / "halves", stop_at=20)
+    halves = run(cache, tmp_path / "halves")
+    for name, value in whole.policy.state_dict().items():
+        assert torch.equal(value, halves.policy.state_dict()[name]), name
+    assert read_rows(tmp_path / "whole" / LOG_FILE) == read_rows(tmp_path / "halves" / LOG_FILE)
+
+
+def test_the_log_says_how_it_does_without_what_matters_and_what_sees_is_left_alone(cache, tmp_path):
+    training = run(cache, tmp_path)
+    fresh = Training.begin(POLICY, SHORT, "cpu").policy.state_dict()
+    for name, value in training.policy.state_dict().items():
+        if name.startswith(("camera.", "fusion.", "memory.")):
+            assert torch.equal(value, fresh[name]), name
+    row = read_rows(tmp_path / LOG_FILE)[-1]
+    columns = {name for name in row if name.startswith("held_out")}
+    assert columns == {"held_out"} | {f"held_out without {names}" for names in SHORT.without}
+    assert all(row[name] > 0.0 for name in columns)
+
+
+def test_each_of_obstacles_and_bev_is_hidden_alone_together_and_not_at_all_often_enough():
+    given = hidden_components(config_named("driveinsight"), 4000, key=1).numpy() > 0.0
+    obstacles, bev = given[:, TOKENS.index("obstacles")], given[:, TOKENS.index("bev")]
+    for one in (True, False):
+        for other in (True, False):
+            assert ((obstacles == one) & (bev == other)).mean() > 0.05
+    told = [TOKENS.index(n) for n in ("map", "obstacles", "traffic_lights", "stop_signs")]
+    assert (~given[:, told]).all(axis=1).mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_without_names_what_is_hidden_and_nothing_else():
+    given = without("obstacles+bev", 2)
+    assert given.shape == (2, len(TOKENS))
+    assert {TOKENS[n] for n in np.flatnonzero(given[0] == 0.0)} == {"obstacles", "bev"}
+    assert without("", 1).all()
+
+
+def test_nobody_is_set_aside_further_than_asked_and_a_share_of_them_not_at_all():
+    right_m, turn_rad = set_aside(Variation(aside_m=1.0, turn_rad=0.2, share=0.5), 2000, key=3)
+    assert np.abs(right_m).max() <= 1.0
+    assert np.abs(turn_rad).max() <= 0.2
+    assert (right_m == 0.0).mean() == pytest.approx(0.5, abs=0.05)
+
+
+def truth(batch=400):
+    """A car 30 m ahead at 10 m/s, a walker as far, and a red light, in each sample."""
+    objects, signals = np.zeros((batch, 24, 9), np.float32), np.zeros((batch, 2, 8), np.float32)
+    objects[:, 0] = [30.0, 0.0, 0.0, 4.5, 2.0, 10.0, 0.0, 1, 1]
+    objects[:, 1] = [30.0, 3.0, 0.0, 0.5, 0.5, 1.0, 0.0, 7, 1]
+    signals[:, 0] = [25.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    return objects, signals
+
+
+def test_perfect_eyes_see_the_truth():
+    objects, signals = truth()
+    seen = seen_through(NO_NOISE, POLICY.grid, objects, signals, key=1)
+    assert np.array_equal(seen[0], objects)
+    assert np.array_equal(seen[1], signals)
+
+
+def test_eyes_miss_a_walker_more_often_than_a_car_as_far_away_and_see_ghosts_now_and_then():
+    eyes = EyeConfig(perfect=0.0, missed_at_30_m=0.2, ghosts=0.5)
+    objects, _ = seen_through(eyes, POLICY.grid, *truth(), key=1)
+    ahead = np.abs(objects[..., 0] - 30.0) < 3.0
+    cars = ((objects[..., 7] == 1) & ahead & (objects[..., 5] > 5.0)).any(axis=1)
+    walkers = ((objects[..., 7] == 7) & ahead).any(axis=1)
+    assert cars.mean() == pytest.approx(0.8, abs=0.06)  # 0.2 times 0 to 2
+    assert walkers.mean() < cars.mean() - 0.2
+    assert (objects[..., 8] > 0.0).sum() > cars.sum() + walkers.sum()
+    assert (np.diff(objects[..., 8], axis=1) <= 0.0).all()  # by falling score
+
+
+def test_eyes_tell_a_light_by_probabilities_that_sum_to_one():
+    _, signals = seen_through(EyeConfig(perfect=0.0), POLICY.grid, *truth(), key=1)
+    there = signals[..., 7] > 0.0
+    assert signals[there][:, 3:7].sum(axis=1) == pytest.approx(np.ones(there.sum()), abs=1e-5)
+    assert (signals[there][:, 3] > 0.5).mean() > 0.9
