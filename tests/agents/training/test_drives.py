@@ -225,7 +225,7 @@ def other_world(folder, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (other_weights, "agent_version was driveinsight 1, files .*, is driveinsight 1, files"),
+        (other_weights, "agent_version was driveinsight 2, files .*, is driveinsight 2, files"),
         (other_world, f"world_version was {WORLD_VERSION}, is 0"),
     ],
 )
