@@ -97,8 +97,7 @@ class MomentReader:
     """Reads moments of drives in one town."""
 
     def __init__(self, town: Town, plan_of: Callable[[str], RoutePlan], grid: GridConfig) -> None:
-        self._town, self._grid = town, grid
-        self._plan_of = plan_of
+        self._town, self._plan_of, self._grid = town, plan_of, grid
         self._stages: dict[Any, tuple[DriveStage, Observer]] = {}
 
     def read(self, drive: RecordedDrive, moment: int, out: NDArray[np.void]) -> None:
