@@ -36,7 +36,7 @@ from di_envs.town.plan import RoutePlan
 SHIPPED = Path(__file__).parent / "weights"  # a folder for each policy, by its name
 CONTROL_DT_S = 0.1
 
-Frame = tuple[Tensor, Tensor]  # fused BEV features (1, C, X, Y) and the pose (1, 3) of a decision
+Frame = tuple[Tensor, Tensor]  # what is remembered (1, C, X, Y) of a decision, and its pose (1, 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,9 +98,9 @@ class DriveInsightAgent:
         with one_thread(), torch.inference_mode():
             inputs, output = self._decide(observation, memory)
         frames = memory.frames
-        if output.bev is not None and inputs.pose is not None:
+        if output.remembered is not None and inputs.pose is not None:
             reach = config.memory_frames * self._every
-            frames = ((output.bev, inputs.pose), *frames)[:reach]
+            frames = ((output.remembered, inputs.pose), *frames)[:reach]
         control, controllers = waypoints_to_control(
             output.waypoints[0].numpy(),
             float(observation["speed"][0]),
@@ -139,7 +139,8 @@ class DriveInsightAgent:
         """The frames that are whole multiples of the memory's step old."""
         if not frames:
             return None
-        bank = self.policy.empty_bank(1, like=frames[0][0])
+        assert self.policy.perception is not None, "who remembers has seen"
+        bank = self.policy.perception.empty_bank(1, like=frames[0][0])
         for features, pose in reversed(frames[self._every - 1 :: self._every]):
             bank = bank.remember(features, pose)
         return bank

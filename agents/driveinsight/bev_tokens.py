@@ -10,9 +10,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.driveinsight.config import GridConfig, PlannerConfig
+from agents.driveinsight.config import PlannerConfig
 from agents.driveinsight.seen import Seen
 from agents.driveinsight.tokens import PromptEncoder
+from agents.networks.grid import GridConfig
 from agents.networks.route_frame import SPACING_M
 from agents.networks.taps import Tap
 

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from torch import Tensor, nn
 
 from agents.base import Observation
+from agents.driveinsight.camera import image_groups
 from agents.driveinsight.config import BEV, TOKENS, PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Output, Policy
 from agents.driveinsight.seen import OBJECTS, SIGNALS
@@ -60,12 +61,14 @@ def anatomy_of(config: PolicyConfig) -> Anatomy:
         groups[BEV] = TokenGroup(tap="bev.tokens", keys=spans[BEV])
         grid = config.grid
         maps[BEV] = FeatureMap(
-            tap="memory.bev" if config.memory_frames else "fusion.bev",
+            tap="perception.memory.bev",
             extent_m=(grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m),
         )
     if config.camera is not None:
-        for item, camera in enumerate(rig_of(config.camera.rig).cameras):
-            maps[camera.name] = FeatureMap(tap="camera.features", item=item, camera=camera.name)
+        for number, group in enumerate(image_groups(rig_of(config.camera.rig))):
+            tap = f"perception.camera.views.{number}.features"
+            for item, camera in enumerate(group):
+                maps[camera.name] = FeatureMap(tap=tap, item=item, camera=camera.name)
     attention = (
         f"planner.layers.{layer}.attention.weights" for layer in range(config.planner.layers)
     )

@@ -273,7 +273,7 @@ def batches(
         sampler=order(training, first_step, share),
         collate_fn=batch_of,
         num_workers=workers,
-        worker_init_fn=_begin_worker,
+        worker_init_fn=begin_worker,
         **ahead,
     )
     try:
@@ -283,7 +283,7 @@ def batches(
         raise TrainingError(last.rpartition("Error: ")[2]) from error
 
 
-def _begin_worker(_: int) -> None:
+def begin_worker(_: int) -> None:
     """Lets the process that trains stop its workers, when it has saved.
 
     A worker leaves without tidying its interpreter up: torch may still be sending a batch that

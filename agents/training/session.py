@@ -168,14 +168,23 @@ def chosen_device(name: str) -> str:
     return "cuda" if torch.cuda.is_available() else "cpu"
 
 
-def chosen_precision(name: str, device: str) -> str:
-    """`float32` or `bfloat16`; `auto` takes what the device has built in."""
+def chosen_precision(name: str, device: str, *, convolves: bool = False) -> str:
+    """`float32` or `bfloat16`; `auto` takes what the device has built in.
+
+    Args:
+        name: What was asked for.
+        device: `cpu` or `cuda`.
+        convolves: Whether most of the time goes into convolutions: these are faster in bfloat16
+            with AVX-512 already (1.7 times, on an EPYC), products of small matrices are not.
+    """
     if name != "auto":
         return name
     if device.startswith("cuda"):
         fast = torch.cuda.is_bf16_supported(including_emulation=False)
     else:
-        fast = torch.cpu.get_capabilities().get("amx_bf16", False)
+        built_in = torch.cpu.get_capabilities()
+        fast = built_in.get("amx_bf16", False)
+        fast = fast or (convolves and built_in.get("avx512_bf16", False))
     return "bfloat16" if fast else "float32"
 
 

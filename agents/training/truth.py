@@ -11,25 +11,34 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.driveinsight.config import GridConfig
+from agents.driveinsight.perception_losses import IGNORED
 from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.expert.occlusion import Buildings, buildings_of, collect_hiders, is_hidden
+from agents.networks.grid import GridConfig
+from agents.training.bev_teacher import mark_box
 from di_envs.numerics.arrays import Float32, Float64
 from di_envs.numerics.geometry import to_local, wrap_angle
 from di_envs.numerics.integers import as_int64
 from di_envs.numerics.kernels import kernel
 from di_envs.prompt import LEVEL_M
 from di_envs.prompt_surroundings import fill_obstacle
+from di_envs.sensors.camera.config import CameraConfig
+from di_envs.sensors.scene.raster import Rectangle
+from di_envs.sensors.scene.scene import scene_of
 from di_envs.town.lanes import Lanes, LightState, SignalKind, Signals
 from di_envs.town.queries import nearest_driving_lane_towards, pose_at
 from di_envs.world.state import ActorKind, State
 from di_envs.world.world import WorldView
 
+LAMPS = 4  # of one signal that are told: its heads are two
+SIGN_M = 2.3  # above its pole's foot hangs a stop sign
 SIGNAL_AHEAD_M = 50.0  # along the lane, up to which a stop line governs the car
 ON_LANE_M = 3.0  # from a lane's middle, within which the car is on it
 
 _ABSENT, _PROP = int(ActorKind.ABSENT), int(ActorKind.PROP)
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
+_STATE_OF_LIGHT = {LightState.RED: 0, LightState.YELLOW: 1, LightState.GREEN: 2}
+_STOP_STATE = 3
 _RED, _YELLOW, _GREEN = int(LightState.RED), int(LightState.YELLOW), int(LightState.GREEN)
 
 
@@ -144,3 +153,59 @@ def _fill_signal(state: State, signals: Signals, line: int, out: Float32) -> Non
     elif state.light[signal] == _GREEN:
         out[5] = 1.0
     out[7] = 1.0
+
+
+def governing_lamps(view: WorldView, camera: CameraConfig, stride: int) -> NDArray[np.float32]:
+    """Where a camera shows the lit lamps, or the stop sign, that govern the ego's lane.
+
+    Args:
+        view: Of the world.
+        camera: Of the ego.
+        stride: Pixels of the image to one of the map that they are wanted in.
+
+    Returns:
+        (LAMPS, 3) row and column in that map, and the state: 0 red, 1 yellow, 2 green, 3 stop sign;
+        -1 for none.
+    """
+    out = np.full((LAMPS, 3), -1.0, np.float32)
+    state, signals = view.state, view.town.signals
+    line = governing_line(state, view.town.lanes, signals)
+    if line < 0:
+        return out
+    signal = signals.stop_signal[line]
+    if signals.kind[signal] == SignalKind.STOP:
+        places, shown = signals.pose[signal][None, :3] + (0.0, 0.0, SIGN_M), _STOP_STATE
+    else:
+        lamps, light = scene_of(view.town).lamps, LightState(int(state.light[signal]))
+        lit = (lamps.signal == signal) & (lamps.state == light)
+        places, shown = lamps.pose[lit, :3], _STATE_OF_LIGHT.get(light, -1)
+    seen = camera.project(_as_seen(state, places))
+    size = np.array([camera.width, camera.height])
+    inside = (seen[:, 2] > 0.0) & ((seen[:, :2] >= 0.0) & (seen[:, :2] < size)).all(axis=1)
+    found = seen[inside][:LAMPS]
+    out[: len(found), :2] = found[:, 1::-1] / stride
+    out[: len(found), 2] = shown
+    return out
+
+
+def _as_seen(state: State, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) places of the world, ahead, right and up of the ego."""
+    cos, sin = math.cos(state.yaw[0]), math.sin(state.yaw[0])
+    x, y = places[:, 0] - state.x[0], places[:, 1] - state.y[0]
+    return np.stack([cos * x + sin * y, cos * y - sin * x, places[:, 2] - state.z[0]], axis=1)
+
+
+def hidden_cells(
+    objects: NDArray[np.float32], grid: GridConfig, semantics: NDArray[np.uint8]
+) -> None:
+    """Marks the cells of those who are hidden as `IGNORED`: nobody can be asked for them.
+
+    Args:
+        objects: (N, 9) from `seen_truth`.
+        grid: Of both.
+        semantics: (X, Y), written.
+    """
+    sides = np.array([grid.x_min_m, grid.y_min_m, grid.cell_x_m, grid.cell_y_m])
+    ego = np.zeros(4)
+    for x, y, yaw, length, width in objects[objects[:, 8] == 0.0, :5].tolist():
+        mark_box(Rectangle(x, y, yaw, 0.5 * length, 0.5 * width), ego, sides, IGNORED, semantics)

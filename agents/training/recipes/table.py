@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from agents.training.recipes.driving import CollectStage, CorrectStage, run_collect, run_correct
 from agents.training.recipes.kinds import Product, StageKind
+from agents.training.recipes.perceiving import PerceiveStage, run_perceive
 from agents.training.recipes.training import PlanStage, TrainStage, run_train
 
 STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
@@ -26,6 +27,13 @@ STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
             takes={"learner": Product.POLICY},
             run=run_correct,
             drives=True,
+        ),
+        "perceive": StageKind(
+            summary="a policy's eyes learn to see, alone",
+            settings=PerceiveStage,
+            makes=Product.POLICY,
+            takes={"data": Product.DRIVES, "init_from": Product.POLICY},
+            run=run_perceive,
         ),
         "plan": StageKind(
             summary="a planner learns alone, from encoded moments",

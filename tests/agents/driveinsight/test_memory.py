@@ -6,8 +6,8 @@ import math
 
 import torch
 
-from agents.driveinsight.config import GridConfig
 from agents.driveinsight.memory import TemporalFusion, empty_bank, warp
+from agents.networks.grid import GridConfig
 
 GRID = GridConfig()
 

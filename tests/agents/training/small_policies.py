@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from torch import Tensor
+
 from agents.driveinsight.config import (
     CameraEncoderConfig,
     GridConfig,
@@ -28,3 +30,8 @@ SEEING = PolicyConfig(
     memory_frames=2,
     bev_width=4,
 )
+
+
+def on_disk(value: Tensor) -> Tensor:
+    """A weight as it comes back from where it was saved: float16 has rounded it."""
+    return value.half().to(value.dtype) if value.is_floating_point() else value

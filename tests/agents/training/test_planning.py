@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.driveinsight.config import TOKENS, PolicyConfig, config_named
+from agents.driveinsight.config import TOKENS, config_named
 from agents.training.caching import MOMENT, cached
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import DriveStage, read_drive
@@ -24,9 +24,7 @@ from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
 from tests.agents.training.small_policies import SEEING
 
-POLICY: PolicyConfig = dataclasses.replace(
-    SEEING, grid=config_named("driveinsight").grid, lidar=None
-)
+POLICY = dataclasses.replace(SEEING, grid=config_named("driveinsight").grid, lidar=None)
 SHORT = TrainConfig(
     **{**PLANNING, "measured_moments": 8, "measured_every": 20},
     steps=30,

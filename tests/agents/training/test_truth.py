@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.driveinsight.config import GridConfig
+from agents.networks.grid import GridConfig
 from agents.training.truth import SIGNAL_AHEAD_M, seen_truth
 from di_envs.town.lanes import LightState
 from di_envs.world.state import ActorKind
