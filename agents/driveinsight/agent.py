@@ -23,6 +23,7 @@ from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
 from agents.driveinsight.weights import WeightsError, from_pretrained
+from agents.networks.fused import fuse_norms
 from agents.networks.taps import editing
 from agents.one_thread import one_thread
 from di_envs.actions.controllers import (
@@ -168,6 +169,8 @@ def _policy(name: str, folder: Path) -> Policy:
             f"says how) and name their folder: driveinsight:runs/{name}/policy"
         )
     try:
-        return from_pretrained(folder)
+        policy = from_pretrained(folder)
     except WeightsError as error:
         raise AgentSpecError(f"agent 'driveinsight': {error}") from error
+    fuse_norms(policy)
+    return policy

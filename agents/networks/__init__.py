@@ -10,5 +10,6 @@ resnet.py      images to feature maps
 pyramid.py     feature maps of several scales to the finest
 lift.py        features of pixels, by their depths, to cells
 blocks.py      normalised convolutions, channels that are weighed
+fused.py       normalisation folded into convolutions, for who no longer learns
 unet.py        a map to one of the same size that has looked far
 """

@@ -11,12 +11,13 @@ from agents import AgentSpecError, load_agent
 from agents.base import Track
 from agents.driveinsight.config import (
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     PlannerConfig,
     PolicyConfig,
 )
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
+from agents.networks.grid import GridConfig
 from tests.agents.driveinsight.random_inputs import awake
 
 CONFIG = PolicyConfig(
@@ -26,7 +27,7 @@ CONFIG = PolicyConfig(
     lidar=None,
     planner=PlannerConfig(width=16, heads=2, layers=1),
     memory_frames=2,
-    bev_width=4,
+    fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
 )
 
 

@@ -12,7 +12,7 @@ from agents.driveinsight.config import (
     CONFIGS,
     TOKENS,
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     LidarEncoderConfig,
     PlannerConfig,
     PolicyConfig,
@@ -21,6 +21,7 @@ from agents.driveinsight.config import (
 from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
+from agents.networks.grid import GridConfig
 from agents.networks.taps import editing, tap_names, watching
 from tests.agents.driveinsight.random_inputs import awake, random_inputs, random_targets, sample
 
@@ -97,9 +98,9 @@ def test_a_policy_without_privilege_reads_no_privileged_component():
 
 def test_memory_comes_in_and_goes_out_as_a_value(small):
     first, second = random_inputs(small.config, seed=1), random_inputs(small.config, seed=2)
-    empty = small.empty_bank(1, like=torch.zeros(1))
+    empty = small.perception.empty_bank(1, like=torch.zeros(1))
     with torch.inference_mode():
-        bank = empty.remember(small(first).bev, first.pose)
+        bank = empty.remember(small(first).remembered, first.pose)
         remembered = small(second, bank).waypoints
         again = small(second, bank).waypoints
         forgetful = small(second, empty).waypoints
@@ -113,8 +114,9 @@ def test_gradients_reach_every_parameter(name):
     inputs = random_inputs(policy.config, batch=2)
     output = policy(inputs)
     bank = None
-    if policy.memory is not None:
-        bank = policy.empty_bank(2, like=output.bev).remember(output.bev, inputs.pose)
+    if policy.config.memory_frames:
+        remembered = output.remembered
+        bank = policy.perception.empty_bank(2, like=remembered).remember(remembered, inputs.pose)
         output = policy(inputs, bank)
     losses(output, random_targets(output), LossConfig())["total"].backward()
     without = [name for name, value in policy.named_parameters() if value.grad is None]
@@ -127,9 +129,9 @@ TINY = PolicyConfig(
     name="tiny",
     grid=GridConfig(cells=16),
     camera=CameraEncoderConfig(rig="rl", width=8, channels=16, depth_bins=24),
-    lidar=LidarEncoderConfig(voxel_m=1.2, voxel_z_m=2.0, widths=(8, 16), channels=16),
+    lidar=LidarEncoderConfig(channels=16),
     planner=PlannerConfig(width=48, heads=4, layers=2),
-    bev_width=16,
+    fusion=FusionConfig(width=16, remembered=8, widths=(16, 16)),
 )
 
 
@@ -184,7 +186,8 @@ def test_near_waypoints_weigh_more_than_far_ones(small):
 
 def test_taps_are_named_by_their_place_and_can_be_edited(small):
     names = tap_names(small)
-    assert {"camera.depth", "lidar.bev", "fusion.bev", "memory.bev", "waypoints"} <= set(names)
+    eyes = ("camera.views.1.depth", "lidar.bev", "fusion.bev", "memory.bev", "heads.lamps.tap")
+    assert {*(f"perception.{name}" for name in eyes), "waypoints"} <= set(names)
     assert "planner.layers.0.attention.weights" in names
     inputs = random_inputs(small.config)
     with torch.inference_mode(), watching(small, "planner.layers.0.attention.weights") as seen:
@@ -203,8 +206,8 @@ def test_taps_are_named_by_their_place_and_can_be_edited(small):
 
 
 def test_an_unknown_tap_is_refused_with_a_suggestion(small):
-    unknown = r"Unknown tap 'fusion.bew'; did you mean 'fusion.bev'"
-    with pytest.raises(ValueError, match=unknown), watching(small, "fusion.bew"):
+    unknown = r"Unknown tap 'perception.fusion.bew'; did you mean 'perception.fusion.bev'"
+    with pytest.raises(ValueError, match=unknown), watching(small, "perception.fusion.bew"):
         pass
 
 

@@ -108,7 +108,7 @@ def test_a_masked_map_loses_whole_cells_and_that_share_of_them(seeing):
     inputs = random_inputs(seeing.config)
     _, plain = planned(seeing, inputs)
     _, masked = planned(seeing, inputs, "mask:bev,p=0.3")
-    before, after = plain["memory.bev"][0], masked["memory.bev"][0]
+    before, after = plain["perception.memory.bev"][0], masked["perception.memory.bev"][0]
     lost = (after == 0).all(dim=0)
     assert torch.equal(after[:, ~lost], before[:, ~lost])
     assert lost.float().mean() == pytest.approx(0.3, abs=0.05)
