@@ -144,7 +144,7 @@ SCHEMES: dict[str, AgentEntry] = {
     ),
     "true-sight": AgentEntry(
         entry_point="agents.training.true_sight:TrueSightAgent",
-        summary="true-sight:FOLDER: such a policy, whose eyes are the simulator (PRIVILEGED)",
+        summary="true-sight:FOLDER[?eyes=blurred]: one whose eyes are the simulator (PRIVILEGED)",
         version=1,
         argument="weights",
         data_files=POLICY_FILES,

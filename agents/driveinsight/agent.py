@@ -126,14 +126,14 @@ class DriveInsightAgent:
     def _decide(
         self, observation: Observation, memory: DriveInsightMemory
     ) -> tuple[Inputs, Output]:
-        inputs = self._inputs(observation)
+        inputs = self._inputs(observation, memory)
         moment = DecisionMoment(
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
         with editing(self.policy, tap_edits(self._edits, moment)):
             return inputs, self.policy(inputs, self._bank(memory.frames))
 
-    def _inputs(self, observation: Observation) -> Inputs:
+    def _inputs(self, observation: Observation, memory: DriveInsightMemory) -> Inputs:
         return inputs_of(self.policy.config, observation)
 
     def _bank(self, frames: tuple[Frame, ...]) -> MemoryBank | None:

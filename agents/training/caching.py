@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.driveinsight.heads import CLASS_OF_KIND, KIND_OF_CLASS
 from agents.driveinsight.seen import OBJECT_COLUMNS, OBJECTS, SIGNAL_COLUMNS, SIGNALS
 from agents.networks.grid import GridConfig
 from agents.training.config import TrainingError
@@ -35,9 +36,10 @@ from di_envs.prompt import (
 from di_envs.town.map_chunks import POINTS
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+from di_envs.world.kinds import ActorKind
 from di_envs.world.world import WorldView
 
-FORMAT = 1  # of the files; a change of the rows raises it
+FORMAT = 2  # of the files; a change of the rows raises it
 MOST = 100_000  # moments that a cache holds
 WAYPOINTS = 8  # of the expert that are kept
 
@@ -60,6 +62,12 @@ MOMENT = np.dtype(
         ("valid", "u1", WAYPOINTS),
     ]
 )
+_KIND = 7  # column of an object
+# By `ActorKind`, as which of them perception takes it: a van and a car look alike
+_SEEMS = np.array(
+    [KIND_OF_CLASS[CLASS_OF_KIND[kind]] if kind in CLASS_OF_KIND else 0 for kind in ActorKind],
+    np.float32,
+)
 _AS_TOLD = (
     *("command", "target_point", "routing", "obstacles", "traffic_lights", "stop_signs"),
     *("speed", "speed_history"),
@@ -80,6 +88,7 @@ def truly_seen(
     objects = np.zeros((OBJECTS, OBJECT_COLUMNS), np.float32)
     signals = np.zeros((SIGNALS, SIGNAL_COLUMNS), np.float32)
     objects[: len(nearest)] = found[nearest]
+    objects[:, _KIND] = _SEEMS[objects[:, _KIND].astype(np.int64)]
     signals[: len(signal)] = signal[:SIGNALS]
     return objects, signals
 
@@ -88,8 +97,7 @@ class MomentReader:
     """Reads moments of drives in one town."""
 
     def __init__(self, town: Town, plan_of: Callable[[str], RoutePlan], grid: GridConfig) -> None:
-        self._town, self._grid = town, grid
-        self._plan_of = plan_of
+        self._town, self._plan_of, self._grid = town, plan_of, grid
         self._stages: dict[Any, tuple[DriveStage, Observer]] = {}
 
     def read(self, drive: RecordedDrive, moment: int, out: NDArray[np.void]) -> None:

@@ -66,6 +66,7 @@ class DriveJob:
         town: Name of the training town.
         number: Of the drive in it.
         driver: The agent that drives; any but `expert` is a learner, which the expert corrects.
+        called: What its drives call it; empty for `driver`, which may say where its weights lie.
         hiding: What a learner is not told, in which share of its drives.
     """
 
@@ -73,6 +74,7 @@ class DriveJob:
     town: str
     number: int
     driver: str = EXPERT
+    called: str = ""
     hiding: Hiding = EVERYTHING
 
     @property
@@ -114,6 +116,7 @@ def collect(
     frames: int,
     *,
     driver: str = EXPERT,
+    called: str = "",
     hiding: Hiding = EVERYTHING,
     first: int = 0,
     workers: int = 1,
@@ -128,6 +131,7 @@ def collect(
         towns: Names of training towns.
         frames: Moments in all.
         driver: See `DriveJob`.
+        called: See `DriveJob`.
         hiding: See `DriveJob`.
         first: Number of each town's first drive.
         workers: Drives at the same time.
@@ -142,7 +146,14 @@ def collect(
     with pool or processes(workers) as drivers:
         for town in towns:
             jobs = (
-                DriveJob(folder=folder, town=town, number=number, driver=driver, hiding=hiding)
+                DriveJob(
+                    folder=folder,
+                    town=town,
+                    number=number,
+                    driver=driver,
+                    called=called,
+                    hiding=hiding,
+                )
                 for number in range(first, first + 10**6)
             )
             yield from _collect_town(drivers, jobs, share, workers)
@@ -205,18 +216,14 @@ def drive_job(job: DriveJob) -> Outcome:
 
 @lru_cache(2)
 def _driven_by(driver: str) -> Mapping[str, Any]:
-    """Who drives, and in which world."""
-    return {
-        "driver": driver,
-        "agent_version": agent_version(driver),
-        "world_version": WORLD_VERSION,
-    }
+    """Which version of a driver drives, and in which world."""
+    return {"agent_version": agent_version(driver), "world_version": WORLD_VERSION}
 
 
 def _common(job: DriveJob) -> Mapping[str, Any]:
     """What all drives of a folder have in common."""
     told = {} if job.driver == EXPERT else {"hiding": job.hiding.shares()}
-    return {**_driven_by(job.driver), **told}
+    return {"driver": job.called or job.driver, **_driven_by(job.driver), **told}
 
 
 def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:

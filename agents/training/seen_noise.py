@@ -112,7 +112,7 @@ def _blurred_objects(
     out[..., _YAW] += np.pi * (drawn[..., 1] < bad * eyes.flipped)
     out[..., 3:5] *= 1.0 + 0.1 * bad[..., None] * np.clip(off[..., 3:5], -2.0, 2.0)
     out[..., _SPEEDS] += bad[..., None] * eyes.speed_mps * off[..., 5:7]
-    sure = 1.0 - np.minimum(0.6, bad * (0.1 + 0.3 * drawn[..., 2]) * np.sqrt(1.0 + seeming))
+    sure = 1.0 - np.minimum(0.8, bad * (0.1 + 0.4 * drawn[..., 2]) * np.sqrt(1.0 + seeming))
     out[..., _SCORE] = (objects[..., _SCORE] > 0.0) * (drawn[..., 0] >= missed) * sure
     return _nothing_where(out, _SCORE)
 
@@ -136,7 +136,7 @@ def _ghosts(
     last[..., 3:5], last[..., _KIND] = kinds[..., 1:], kinds[..., 0]
     there = drawn[..., 4] < np.minimum(level * eyes.ghosts / slots, 1.0)[:, None]
     free = objects[:, -slots:, _SCORE] == 0.0
-    last[..., _SCORE] = there * free * (0.3 + 0.4 * drawn[..., 5])
+    last[..., _SCORE] = there * free * (0.15 + 0.5 * drawn[..., 5])
     return _nothing_where(out, _SCORE)
 
 

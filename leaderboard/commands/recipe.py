@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -18,7 +19,14 @@ WORKERS = 2  # where nobody says how many
 
 
 def run_recipe_file(
-    path: Path, output: Path, *, until: str | None, listed: bool, workers: int | None, device: str
+    path: Path,
+    output: Path,
+    *,
+    until: str | None,
+    minutes: float | None,
+    listed: bool,
+    workers: int | None,
+    device: str,
 ) -> int:
     """Does the stages of a recipe that are not done, or lists all; returns the exit code.
 
@@ -26,6 +34,7 @@ def run_recipe_file(
         path: Of the recipe.
         output: Folder for those of the stages.
         until: Name of the last stage to do; None for all.
+        minutes: After which it stops; None for never.
         listed: List them, do nothing.
         workers: Processes that drive or render; None for `WORKERS`.
         device: Where torch trains.
@@ -35,6 +44,9 @@ def run_recipe_file(
     """
     if workers is not None and workers < 1:
         raise UsageError("--workers must be at least 1 with --recipe")
+    if minutes is not None and not minutes > 0.0:
+        raise UsageError("--minutes must be more than 0")
+    end_s = float("inf") if minutes is None else monotonic() + 60.0 * minutes
 
     from agents.driveinsight.weights import WeightsError
     from agents.training.config import TrainingError
@@ -50,8 +62,7 @@ def run_recipe_file(
         if listed:
             _list(recipe, output)
             return 0
-        done = _run(recipe, output, until, machine)
-        if not done:
+        if not _run(recipe, output, until, machine, end_s):
             again = ["driveinsight", "train", "--recipe", str(path), "--output", str(output)]
             say("Stopped; what was done is kept.", f"Next: {shlex.join(again)} goes on")
             return EXIT_INTERRUPTED
@@ -63,8 +74,8 @@ def run_recipe_file(
     return 0
 
 
-def _run(recipe: Recipe, output: Path, until: str | None, machine: Machine) -> bool:
-    """Does the stages under a bar; returns whether all are done."""
+def _run(recipe: Recipe, output: Path, until: str | None, machine: Machine, end_s: float) -> bool:
+    """Does the stages under a bar, up to a time of the clock; returns whether all are done."""
     from agents.training.recipes.running import run_recipe
     from leaderboard.records.folder_lock import folder_lock
     from leaderboard.running.displays.recipe import RecipeDisplay
@@ -72,7 +83,11 @@ def _run(recipe: Recipe, output: Path, until: str | None, machine: Machine) -> b
 
     with folder_lock(output), interruptible() as interruption:
         stages = len(recipe.until(until))
-        with RecipeDisplay(stages, stop=lambda: interruption.requested, say=say) as display:
+
+        def stop() -> bool:
+            return interruption.requested or monotonic() > end_s
+
+        with RecipeDisplay(stages, stop=stop, say=say) as display:
             return run_recipe(recipe, output, display, until=until, machine=machine)
 
 

@@ -44,7 +44,7 @@ crash the same command goes on, and comes to the same bits (on a CPU)."""
 
 
 # What can be said beside a recipe
-_OF_RECIPES = ("recipe", "stage", "listed", "output", "workers", "device")
+_OF_RECIPES = ("recipe", "stage", "minutes", "listed", "output", "workers", "device")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +53,13 @@ class Train:
 
     recipe: Annotated[Path | None, says("FILE", "none")] = None
     """A file that names all stages from nothing to the weights; beside it only --output, --stage,
-    --list, --workers and --device can be said."""
+    --minutes, --list, --workers and --device can be said."""
 
     stage: Annotated[str | None, says("NAME", "the recipe's last")] = None
     """With --recipe: the last stage to do."""
+
+    minutes: Annotated[float | None, says("N", "until it is done")] = None
+    """With --recipe: stop after so long as after Ctrl-C, and go on with the next call."""
 
     listed: Annotated[bool, tyro.conf.arg(name="list")] = False
     """With --recipe: do nothing, show its stages, which are done, what they took."""
@@ -137,12 +140,13 @@ class Train:
                 self.recipe,
                 self.output or Path("runs") / self.recipe.stem,
                 until=self.stage,
+                minutes=self.minutes,
                 listed=self.listed,
                 workers=self.workers,
                 device=self.device,
             )
-        if self.stage is not None or self.listed:
-            raise UsageError("--stage and --list are of a recipe: add --recipe FILE")
+        if self.stage is not None or self.minutes is not None or self.listed:
+            raise UsageError("--stage, --minutes and --list are of a recipe: add --recipe FILE")
         self._check_numbers()
 
         from agents.driveinsight.weights import WeightsError

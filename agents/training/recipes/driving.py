@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from typing import Literal
 
 from agents.training.collect import (
     CARD_FILE,
@@ -46,6 +47,8 @@ class CorrectStage:
     Attributes:
         learner: Stage whose policy drives.
         frames: Moments in all; each town gets its share.
+        eyes: Its own, or those of the simulator, `perfect` or `blurred` as in training: with these
+            nothing is rendered.
         towns: Where.
         hidden: Share of the drives in which components are hidden from it, by their names; see
             `Hiding`.
@@ -53,6 +56,7 @@ class CorrectStage:
 
     learner: str
     frames: int
+    eyes: Literal["own", "perfect", "blurred"] = "own"
     towns: tuple[str, ...] = tuple(TRAINING_TOWNS)
     hidden: Mapping[str, float] = field(default_factory=dict)
 
@@ -79,7 +83,9 @@ def run_collect(run: StageRun) -> Made | None:
 def run_correct(run: StageRun) -> Made | None:
     """The policy drives until each town has its share of corrections."""
     settings: CorrectStage = run.settings
-    driver = f"driveinsight:{run.takes['learner'][0] / POLICY_FOLDER}"
+    policy = run.takes["learner"][0] / POLICY_FOLDER
+    own = settings.eyes == "own"
+    driver = f"driveinsight:{policy}" if own else f"true-sight:{policy}?eyes={settings.eyes}"
     return _drive(run, settings.towns, settings.frames, driver, Hiding.of(settings.hidden))
 
 
@@ -88,12 +94,14 @@ def _drive(
 ) -> Made | None:
     with run.compiling():
         compile_for_drives(towns[0])
+    called = driver.replace(f"{run.folder.parent}/", "")  # the same wherever the recipe is run
     total, kept, driven, began_s = share_of(frames, towns) * len(towns), 0, 0, time.monotonic()
     outcomes = collect(
         run.folder,
         towns,
         frames,
         driver=driver,
+        called=called,
         hiding=hiding,
         first=run.first,
         workers=run.machine.workers,

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from agents.training.recipes.driving import CollectStage, CorrectStage, run_collect, run_correct
 from agents.training.recipes.kinds import Product, StageKind
 from agents.training.recipes.perceiving import PerceiveStage, run_perceive
-from agents.training.recipes.training import TrainStage, run_train
+from agents.training.recipes.training import PlanStage, TrainStage, run_train
 
 STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
     {
@@ -35,8 +35,15 @@ STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
             takes={"data": Product.DRIVES, "init_from": Product.POLICY},
             run=run_perceive,
         ),
+        "plan": StageKind(
+            summary="a planner learns alone, from encoded moments",
+            settings=PlanStage,
+            makes=Product.POLICY,
+            takes={"data": Product.DRIVES, "init_from": Product.POLICY},
+            run=run_train,
+        ),
         "train": StageKind(
-            summary="a policy learns from drives, pictures rendered on the way",
+            summary="a whole policy learns, pictures rendered on the way",
             settings=TrainStage,
             makes=Product.POLICY,
             takes={"data": Product.DRIVES, "init_from": Product.POLICY},

@@ -1,25 +1,70 @@
-"""The stage that trains a policy on drives, each sample rendered when it is wanted."""
+"""Stages that train: a planner alone, from encoded moments, or a whole policy, from pictures."""
 
 from __future__ import annotations
 
+import shutil
 import time
 from contextlib import closing
 from dataclasses import dataclass
 
 from agents.driveinsight.config import config_named
-from agents.training.config import TrainConfig
-from agents.training.loading import Samples
-from agents.training.log import HELD_OUT, read_rows, write_curve
+from agents.training.config import HELD_OUT, PLANNING, TrainConfig
+from agents.training.log import read_rows, write_curve
 from agents.training.loop import LOG_FILE, train
 from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
 from agents.training.session import TrainingPlan, begin, joined
 
+_CACHE_FOLDER = "encoded"  # of moments, in the folder of a stage
 _MEMORY = 0.98  # of the running mean of the waypoint loss
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlanStage:
+    """A planner learns alone, from encoded moments and eyes that are lent it.
+
+    Attributes:
+        data: Stages whose drives it learns from.
+        config: Name of the policy's configuration.
+        init_from: Stage whose policy it begins with; empty for fresh weights.
+        steps: Updates of the weights.
+        batch: Samples a step.
+        learning_rate: At its highest.
+        held_out: Share of the drives that is kept out, to measure by.
+    """
+
+    data: tuple[str, ...]
+    config: str
+    init_from: str = ""
+    steps: int = 4000
+    batch: int = 128
+    learning_rate: float = 1e-3
+    held_out: float = 0.05
+
+    def __post_init__(self) -> None:
+        config_named(self.config)
+        self.training(seed=0)
+
+    @property
+    def precision(self) -> str:
+        """A planner is too small for less to be faster."""
+        return "float32"
+
+    def training(self, seed: int) -> TrainConfig:
+        """How it is trained."""
+        return TrainConfig(
+            steps=self.steps,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            warm_up=min(200, self.steps // 10),
+            held_out=self.held_out,
+            seed=seed,
+            **PLANNING,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class TrainStage:
-    """A policy learns; see `TrainConfig` for what is not said here.
+    """A whole policy learns from what it sees, rendered on the way.
 
     Attributes:
         data: Stages whose drives it learns from.
@@ -62,7 +107,7 @@ class TrainStage:
 
 def run_train(run: StageRun) -> Made | None:
     """Trains to the last step; the last weights are kept."""
-    settings: TrainStage = run.settings
+    settings: TrainStage | PlanStage = run.settings
     init_from = run.takes["init_from"]
     plan = TrainingPlan(
         policy=config_named(settings.config),
@@ -72,12 +117,12 @@ def run_train(run: StageRun) -> Made | None:
         init_from=init_from[0] / POLICY_FOLDER if init_from else None,
         device=run.machine.device,
         precision=settings.precision,
+        cache=run.folder / _CACHE_FOLDER,
     )
     with joined(plan) as (team, device):
         session = begin(plan, team, device)
         with run.compiling():
-            if isinstance(session.samples, Samples):
-                session.samples[0]  # before several processes need the same kernels
+            session.warm_up()
         with closing(session.batches()) as data:
             done = train(
                 session.training,
@@ -89,6 +134,7 @@ def run_train(run: StageRun) -> Made | None:
             )
     if not done:
         return None
+    shutil.rmtree(plan.cache, ignore_errors=True)  # gigabytes, made again in a minute
     log = read_rows(run.folder / LOG_FILE)
     write_curve(run.folder / "curve.png", log, [])
     kept_out = f", {log[-1][HELD_OUT]:.3f} m on drives kept out" if HELD_OUT in log[-1] else ""
@@ -99,7 +145,7 @@ def run_train(run: StageRun) -> Made | None:
 class _Told:
     """Says of each step how far the training has come, how well it does and how fast it is."""
 
-    def __init__(self, run: StageRun, settings: TrainStage, first: int) -> None:
+    def __init__(self, run: StageRun, settings: TrainStage | PlanStage, first: int) -> None:
         self._run, self._settings, self._first = run, settings, first
         self._loss_m, self._began_s = 0.0, time.monotonic()
 

@@ -18,6 +18,7 @@ from agents.driveinsight.config import (
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.networks.grid import GridConfig
+from tests.agents.driveinsight.random_inputs import awake
 
 CONFIG = PolicyConfig(
     name="test",
@@ -34,7 +35,7 @@ CONFIG = PolicyConfig(
 def folder(tmp_path_factory):
     torch.manual_seed(3)
     path = tmp_path_factory.mktemp("policy")
-    save_pretrained(Policy(CONFIG), path, "a card")
+    save_pretrained(awake(Policy(CONFIG)), path, "a card")
     return path
 
 

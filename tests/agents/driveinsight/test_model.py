@@ -295,9 +295,10 @@ def test_a_wrong_configuration_file_says_where_it_is_wrong(tmp_path, small, find
 
 def test_wrong_configurations_are_refused_with_the_next_step():
     with pytest.raises(
-        ValueError, match=r"Unknown policy configuration 'smal'; did you mean 'smal"
+        ValueError,
+        match=r"Unknown policy configuration 'driveinsigth'; did you mean 'drivein",
     ):
-        config_named("smal")
+        config_named("driveinsigth")
     with pytest.raises(ValueError, match=r"field 'memory_frame'; did you mean 'memory_frames'"):
         PolicyConfig.from_mapping({"name": "mine", "memory_frame": 2})
     with pytest.raises(ValueError, match="needs a camera, a LiDAR or a prompt component"):

@@ -74,10 +74,14 @@ def test_drop_is_the_policys_zero_token_to_the_bit_and_zero_is_not(prompted, com
         tokens[verb] = (waypoints, seen[tap])
     assert not tokens["drop"][1].any()
     assert tokens["zero"][1].any()
-    # As training's dropout does it: the token is zero behind its encoder, whatever it encodes.
+    # As training's dropout does it: the token is zero behind its encoder, whatever it encodes, and
+    # without a route nobody is told where they are along it.
     whole = inputs_of(prompted.config, observation)
-    with torch.inference_mode(), editing(prompted, {tap: torch.zeros_like}):
-        dropped_out = prompted(whole).waypoints
+    kept = {} if component == "routing" else {tap: torch.zeros_like}
+    given = whole.present.clone()
+    given[:, COMPONENTS.index(component)] = float(component != "routing")
+    with torch.inference_mode(), editing(prompted, kept):
+        dropped_out = prompted(dataclasses.replace(whole, present=given)).waypoints
     assert torch.equal(tokens["drop"][0], dropped_out)
     assert not torch.equal(tokens["zero"][0], dropped_out)
     assert torch.equal(tokens["identity"][0], planned(prompted, whole)[0])

@@ -18,6 +18,7 @@ from agents.driveinsight.config import (
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.networks.grid import GridConfig
+from tests.agents.driveinsight.random_inputs import awake
 
 CONFIG = PolicyConfig(
     name="test",
@@ -33,7 +34,7 @@ CONFIG = PolicyConfig(
 def save_policy(folder: Path, seed: int = 3, config: PolicyConfig = CONFIG) -> Path:
     """Writes an untrained policy."""
     torch.manual_seed(seed)
-    save_pretrained(Policy(config), folder, "a card")
+    save_pretrained(awake(Policy(config)), folder, "a card")
     return folder
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from torch import Tensor
+
 from agents.driveinsight.config import (
     CameraEncoderConfig,
     FusionConfig,
@@ -29,3 +31,8 @@ SEEING = PolicyConfig(
     memory_frames=2,
     fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
 )
+
+
+def on_disk(value: Tensor) -> Tensor:
+    """A weight as it comes back from where it was saved: float16 has rounded it."""
+    return value.half().to(value.dtype) if value.is_floating_point() else value

@@ -225,7 +225,7 @@ def other_world(folder, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (other_weights, "agent_version was driveinsight 1, files .*, is driveinsight 1, files"),
+        (other_weights, "agent_version was driveinsight 2, files .*, is driveinsight 2, files"),
         (other_world, f"world_version was {WORLD_VERSION}, is 0"),
     ],
 )
@@ -237,7 +237,7 @@ def test_collecting_goes_on_with_the_same_driver_and_world_only(
     monkeypatch.setattr(module, "_drive", None)  # nothing may be driven
     (tmp_path / "weights.safetensors").write_bytes(b"these")
     job = DriveJob(folder=tmp_path, town="small_grid", number=0, driver=f"driveinsight:{tmp_path}")
-    facts = module._driven_by(job.driver)
+    facts = module._common(job)
     if dropped:
         job.dropped_path.parent.mkdir()
         job.dropped_path.write_text(json.dumps({"why": "infractions", **facts}))

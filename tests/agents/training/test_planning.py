@@ -54,8 +54,8 @@ def test_what_is_encoded_and_set_aside_is_what_would_be_observed_there(cache, mo
     row, right_m, turn_rad = len(cache.rows) // 3, 0.7, -0.1
     drive = read_drive(cache.moments.paths[cache.moments.drive[row]])
     town, plan_of = town_of(drive)
-    plan = plan_of(drive.facts["route_id"])
-    stage, observer = DriveStage(town, plan, drive.capacity), Observer(town, ("prompt",))
+    stage = DriveStage(town, plan_of(drive.facts["route_id"]), drive.capacity)
+    observer = Observer(town, ("prompt",))
     observer.start(stage.view)
     moment = int(cache.moments.moment[row])
     stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
