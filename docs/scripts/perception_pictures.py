@@ -31,7 +31,8 @@ from agents.training.sequences import SequenceRenderer
 from agents.training.variation import Variation
 
 PICTURE = Path(__file__).resolve().parents[1] / "images" / "perception.png"
-_COLOURS = ("#ffffff", "#d9d9d9", "#f2c14e", "#d62728", "#7fa8d1", "#2ca02c")  # by `BevClass`
+# By `BevClass`, and last who is hidden
+_COLOURS = ("#ffffff", "#d9d9d9", "#f2c14e", "#d62728", "#7fa8d1", "#2ca02c", "#e6ddf0")
 _SHOWN = ("red", "gold", "limegreen", "firebrick")  # by a signal's state
 _MOTION_S = 1.0  # for which an arrow goes on
 
@@ -59,7 +60,7 @@ def draw_map(axes: Axes, semantics: NDArray[np.int64], grid: GridConfig, title: 
     """Classes of cells, ahead is up."""
     extent = (grid.y_min_m, grid.y_max_m, grid.x_min_m, grid.x_max_m)
     shades = ListedColormap(_COLOURS)
-    axes.imshow(semantics, cmap=shades, vmin=0, vmax=5, origin="lower", extent=extent, alpha=0.8)
+    axes.imshow(semantics, cmap=shades, vmin=0, vmax=6, origin="lower", extent=extent, alpha=0.8)
     axes.plot(0.0, 0.0, "k^", markersize=5)
     axes.set(xlim=extent[:2], ylim=extent[2:])
     axes.set_title(title, fontsize=7)
@@ -85,8 +86,8 @@ def draw(policy_folder: Path, drives: Path, rows: int) -> None:
         axes[0].set_title(str(drive.facts["town"]), fontsize=7)
         axes[0].set_axis_off()
         targets = moments.targets
-        truth = np.minimum(targets.semantics[-1].numpy(), 5)
-        draw_map(axes[1], truth, grid, "what is there (boxes: in sight)")
+        truth = np.minimum(targets.semantics[-1].numpy(), len(_COLOURS) - 1)
+        draw_map(axes[1], truth, grid, "what is there (boxes: in sight; pale: hidden)")
         draw_rows(axes[1], targets.objects[-1].numpy(), targets.signal[-1:].numpy(), 1.0)
         draw_map(axes[2], heads.semantics[-1].argmax(dim=0).numpy(), grid, "what is seen")
         draw_rows(axes[2], seen.objects[-1].numpy(), seen.signals[-1].numpy(), SCORE)
