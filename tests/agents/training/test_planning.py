@@ -133,7 +133,7 @@ def test_the_log_says_how_it_does_without_what_matters_and_what_sees_is_left_alo
     training = run(cache, tmp_path)
     fresh = Training.begin(POLICY, SHORT, "cpu").policy.state_dict()
     for name, value in training.policy.state_dict().items():
-        if name.startswith(("camera.", "fusion.", "memory.")):
+        if name.startswith("perception."):
             assert torch.equal(value, fresh[name]), name
     row = read_rows(tmp_path / LOG_FILE)[-1]
     columns = {name for name in row if name.startswith("held_out")}
