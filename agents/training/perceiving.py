@@ -309,11 +309,8 @@ class Perceiving:
             for _ in range(_measured(self.config) // self.config.batch):
                 heads, _, targets = self._look(next(data))
                 chosen = torch.arange(len(targets.signal)) % length >= full
-                sums.update(
-                    perception_sums(
-                        _rows(heads, chosen), _rows(targets, chosen), self.policy.config.grid
-                    )
-                )
+                heads, targets = moments_of(heads, chosen), moments_of(targets, chosen)
+                sums.update(perception_sums(heads, targets, self.policy.config.grid))
         return figures(sums)
 
     def _look(self, moments: Moments) -> tuple[Heads, tuple[Tensor, ...], PerceptionTargets]:
@@ -404,7 +401,7 @@ def perceive(
     return training.step == config.steps
 
 
-def _rows(values: Any, chosen: Tensor) -> Any:
+def moments_of(values: Any, chosen: Tensor) -> Any:
     """Some moments of a bundle of tensors."""
 
     def cut(value: Any) -> Any:
