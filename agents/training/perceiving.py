@@ -84,7 +84,7 @@ class PerceiveConfig:
     standing_share: float = 0.2
     precision: str = "float32"
     held_out: float = 0.05
-    measured: int = 40
+    measured: int = 100
     measured_every: int = 500
     variation: Variation = field(default_factory=Variation)
     weights: PerceptionWeights = field(default_factory=PerceptionWeights)

@@ -21,7 +21,8 @@ from di_envs.world.kinds import ActorKind
 
 SCORE = 0.3  # from which on somebody counts as found
 MATCH_M = 2.0  # within which he must be
-VEHICLES_M, WALKERS_M, SIGNALS_M = 30.0, 15.0, 25.0  # ranges that figures are about
+# Ranges that figures are about; within the first a cell counts as near
+VEHICLES_M, WALKERS_M, SIGNALS_M = 30.0, 15.0, 25.0
 _RIDING = (ObjectClass.VEHICLE, ObjectClass.BICYCLE)
 _GROUPS = (("vehicles", _RIDING, VEHICLES_M), ("walkers", (ObjectClass.WALKER,), WALKERS_M))
 _IOU = {"vehicle": BevClass.VEHICLE, "walker": BevClass.WALKER, "stop": BevClass.STOP,
@@ -29,6 +30,8 @@ _IOU = {"vehicle": BevClass.VEHICLE, "walker": BevClass.WALKER, "stop": BevClass
 
 FIGURES: Mapping[str, tuple[str, str]] = {
     **{f"iou_{name}": (f"{name}_both", f"{name}_either") for name in _IOU},
+    "iou_vehicle_near": ("vehicle_near_both", "vehicle_near_either"),
+    "iou_walker_near": ("walker_near_both", "walker_near_either"),
     "vehicles_found": ("vehicles_hit", "vehicles_true"),
     "vehicles_right": ("vehicles_hit", "vehicles_said"),
     "walkers_found": ("walkers_hit", "walkers_true"),
@@ -58,7 +61,7 @@ def perception_sums(heads: Heads, targets: PerceptionTargets, grid: GridConfig) 
         targets: What is there.
         grid: Of both.
     """
-    sums = _overlaps(heads, targets)
+    sums = _overlaps(heads, targets, grid)
     with torch.no_grad():
         seen = read_seen(heads, grid)
     rows = zip(
@@ -72,15 +75,19 @@ def perception_sums(heads: Heads, targets: PerceptionTargets, grid: GridConfig) 
     return sums
 
 
-def _overlaps(heads: Heads, targets: PerceptionTargets) -> Counter[str]:
-    """Cells that hold a class in both maps, and in either."""
+def _overlaps(heads: Heads, targets: PerceptionTargets, grid: GridConfig) -> Counter[str]:
+    """Cells that hold a class in both maps, and in either: of all, and of those nearby."""
     said, true = heads.semantics.argmax(dim=1), targets.semantics.long()
+    step = torch.arange(grid.cells, device=said.device) + 0.5
+    x, y = grid.x_min_m + step * grid.cell_x_m, grid.y_min_m + step * grid.cell_y_m
+    near = torch.hypot(x[:, None], y) <= VEHICLES_M
     asked = true != IGNORED
     sums = Counter[str]()
     for name, class_ in _IOU.items():
         ours, theirs = (said == int(class_)) & asked, true == int(class_)
-        sums[f"{name}_both"] = int((ours & theirs).sum())
-        sums[f"{name}_either"] = int((ours | theirs).sum())
+        for which, cells in ((name, True), (f"{name}_near", near)):
+            sums[f"{which}_both"] = int((ours & theirs & cells).sum())
+            sums[f"{which}_either"] = int(((ours | theirs) & cells).sum())
     return sums
 
 

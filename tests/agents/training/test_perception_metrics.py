@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import torch
 
 from agents.driveinsight.heads import ObjectClass
-from agents.training.perception_metrics import _object_sums, _signal_sums, figures
+from agents.driveinsight.perception_losses import IGNORED, PerceptionTargets
+from agents.driveinsight.semantics import BevClass
+from agents.networks.grid import GridConfig
+from agents.training.perception_metrics import _object_sums, _overlaps, _signal_sums, figures
 from di_envs.world.kinds import ActorKind
 
 CARS = (ObjectClass.VEHICLE, ObjectClass.BICYCLE)
@@ -63,3 +69,20 @@ def test_signals_are_asked_for_up_to_their_range_and_signs_have_no_state():
     assert "state_asked" not in _signal_sums(signal(20.0, stop=1.0), signal(20.0, stop=1.0))
     alarm = _signal_sums(signal(20.0, red=1.0), np.zeros(8, np.float32))
     assert (alarm["signal_said"], alarm["signal_true"], alarm["signal_hit"]) == (1, 0, 0)
+
+
+def test_overlaps_leave_out_what_is_ignored_and_are_told_for_near_cells_too():
+    grid = GridConfig(x_min_m=-8.0, x_max_m=56.0, y_min_m=-32.0, y_max_m=32.0, cells=64)  # of 1 m
+    semantics = torch.zeros(1, 64, 64, dtype=torch.uint8)
+    semantics[0, 20, 30:34] = int(BevClass.VEHICLE)  # 12.5 m ahead
+    semantics[0, 60, 30:34] = int(BevClass.VEHICLE)  # 52.5 m ahead
+    semantics[0, 21, 30] = IGNORED
+    said = torch.zeros(1, len(BevClass), 64, 64)
+    said[0, int(BevClass.VEHICLE), 20:22, 30:32] = 1.0  # 2 are right, 1 wrong, 1 not asked
+    heads = SimpleNamespace(semantics=said)
+    targets = PerceptionTargets(
+        semantics=semantics, objects=torch.zeros(1, 0, 9), signal=torch.zeros(1, 8), lamps=None
+    )
+    found = figures(_overlaps(heads, targets, grid))
+    assert found["iou_vehicle_near"] == pytest.approx(2 / 5)
+    assert found["iou_vehicle"] == pytest.approx(2 / 9)
