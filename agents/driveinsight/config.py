@@ -233,6 +233,7 @@ class PolicyConfig:
 
 
 _WAY = ("command", "target_point", "routing", "speed", "speed_history")  # and how it moves along it
+_SEEING = PlannerConfig(dropout={**DROPOUT, BEV: 0.1}, together={})  # nothing else shows the world
 _TOLD = PlannerConfig(together={})  # without sensors there is nothing to make up for what is hidden
 
 CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
@@ -243,7 +244,7 @@ CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
             PolicyConfig(
                 name="driveinsight-told", camera=None, lidar=None, memory_frames=0, planner=_TOLD
             ),
-            PolicyConfig(name="driveinsight-sensors", prompt=_WAY),
+            PolicyConfig(name="driveinsight-sensors", prompt=_WAY, planner=_SEEING),
             PolicyConfig(
                 name="route-only",
                 camera=None,

@@ -14,12 +14,13 @@ from types import MappingProxyType
 
 import torch
 
-from agents.base import Observation
+from agents.base import Observation, Requirements
 from agents.driveinsight.agent import (
     DriveInsightAgent,
     DriveInsightMemory,
     requirements_of,
 )
+from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Inputs
 from agents.driveinsight.seen import Seen
@@ -43,10 +44,7 @@ class TrueSightAgent(DriveInsightAgent):
         check_name(eyes, EYES, "kind of eyes")
         super().__init__(weights=weights)
         self._eyes = EYES[eyes]
-        needs = requirements_of(self.policy.config)
-        self.requires = dataclasses.replace(
-            needs, observations=("prompt",), options={}, privileged=True
-        )
+        self.requires = requirements_with_lent_eyes(self.policy.config)
 
     def _inputs(self, observation: Observation, memory: DriveInsightMemory) -> Inputs:
         config = self.policy.config
@@ -58,3 +56,9 @@ class TrueSightAgent(DriveInsightAgent):
             objects=torch.from_numpy(objects).float(), signals=torch.from_numpy(signals).float()
         )
         return dataclasses.replace(inputs_of(blind, observation), seen=seen)
+
+
+def requirements_with_lent_eyes(config: PolicyConfig) -> Requirements:
+    """What a policy of that configuration needs when it need not look for itself."""
+    needs = requirements_of(config)
+    return dataclasses.replace(needs, observations=("prompt",), options={}, privileged=True)

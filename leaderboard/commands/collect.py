@@ -108,7 +108,7 @@ class Collect:
             return EXIT_INTERRUPTED
         say(
             f"Written: {self.output / CARD_FILE} and a file for each drive beside it.",
-            f"Next: driveinsight train --config small --data {self.output}",
+            f"Next: driveinsight train --config driveinsight --data {self.output}",
         )
         return 0
 

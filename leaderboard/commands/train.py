@@ -69,7 +69,7 @@ class Train:
 
     plan_only: bool = False
     """Train the planner alone, by what truly is in sight instead of pictures: hundreds of samples a
-    second. What sees stays as it is."""
+    second. What sees stays as it is, and checks are driven with lent eyes (`true-sight`)."""
 
     cache: Annotated[Path, says("DIR", "cache")] = Path("cache")
     """Where moments are kept encoded for --plan-only: 5 kB each, at most 100,000 of them."""
@@ -262,7 +262,10 @@ def _tell_trained(session: Session) -> None:
         best = max(checked, key=lambda row: row["driving_score"])
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
     policy = folder / POLICY_FOLDER
+    training = session.training
+    blind = training.policy.config.sensors and not training.config.rendered
     say(
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
-        f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny",
+        f"Next: driveinsight evaluate --agent {'true-sight' if blind else 'driveinsight'}:{policy} "
+        f"--suite town05_tiny",
     )

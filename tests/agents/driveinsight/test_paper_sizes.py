@@ -39,9 +39,8 @@ def test_the_papers_sizes_pass_both_ways():
     if free_bytes < MEMORY_BYTES:
         pytest.skip(f"it wants {MEMORY_BYTES / 1e9:.0f} GB of memory, {free_bytes / 1e9:.1f} free")
     output = assert_a_pass_each_way(config_named("paper"))
-    assert [logits.shape for logits in output.encoded.depth] == [
-        (1, 4, 40, 57, 100)
-    ]  # 900 / 16 rounded up, 1600 / 16
+    # 900 / 16 rounded up, 1600 / 16
+    assert [logits.shape for logits in output.encoded.depth] == [(1, 4, 40, 57, 100)]
     assert output.bev.shape == (1, 128, 96, 96)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.driveinsight.config import TOKENS, config_named
+from agents.driveinsight.config import config_named
 from agents.training.caching import MOMENT, cached
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import DriveStage, read_drive
@@ -17,8 +17,6 @@ from agents.training.loading import load_moments, town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
 from agents.training.planning import PlanningSamples, set_aside
-from agents.training.samples import hidden_components, without
-from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
 from agents.training.variation import Variation
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
@@ -141,60 +139,8 @@ def test_the_log_says_how_it_does_without_what_matters_and_what_sees_is_left_alo
     assert all(row[name] > 0.0 for name in columns)
 
 
-def test_each_of_obstacles_and_bev_is_hidden_alone_together_and_not_at_all_often_enough():
-    given = hidden_components(config_named("driveinsight"), 4000, key=1).numpy() > 0.0
-    obstacles, bev = given[:, TOKENS.index("obstacles")], given[:, TOKENS.index("bev")]
-    for one in (True, False):
-        for other in (True, False):
-            assert ((obstacles == one) & (bev == other)).mean() > 0.05
-    told = [TOKENS.index(n) for n in ("map", "obstacles", "traffic_lights", "stop_signs")]
-    assert (~given[:, told]).all(axis=1).mean() == pytest.approx(0.5, abs=0.05)
-
-
-def test_without_names_what_is_hidden_and_nothing_else():
-    given = without("obstacles+bev", 2)
-    assert given.shape == (2, len(TOKENS))
-    assert {TOKENS[n] for n in np.flatnonzero(given[0] == 0.0)} == {"obstacles", "bev"}
-    assert without("", 1).all()
-
-
 def test_nobody_is_set_aside_further_than_asked_and_a_share_of_them_not_at_all():
     right_m, turn_rad = set_aside(Variation(aside_m=1.0, turn_rad=0.2, share=0.5), 2000, key=3)
     assert np.abs(right_m).max() <= 1.0
     assert np.abs(turn_rad).max() <= 0.2
     assert (right_m == 0.0).mean() == pytest.approx(0.5, abs=0.05)
-
-
-def truth(batch=400):
-    """A car 30 m ahead at 10 m/s, a walker as far, and a red light, in each sample."""
-    objects, signals = np.zeros((batch, 24, 9), np.float32), np.zeros((batch, 2, 8), np.float32)
-    objects[:, 0] = [30.0, 0.0, 0.0, 4.5, 2.0, 10.0, 0.0, 1, 1]
-    objects[:, 1] = [30.0, 3.0, 0.0, 0.5, 0.5, 1.0, 0.0, 7, 1]
-    signals[:, 0] = [25.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    return objects, signals
-
-
-def test_perfect_eyes_see_the_truth():
-    objects, signals = truth()
-    seen = seen_through(NO_NOISE, POLICY.grid, objects, signals, key=1)
-    assert np.array_equal(seen[0], objects)
-    assert np.array_equal(seen[1], signals)
-
-
-def test_eyes_miss_a_walker_more_often_than_a_car_as_far_away_and_see_ghosts_now_and_then():
-    eyes = EyeConfig(perfect=0.0, missed_at_30_m=0.2, ghosts=0.5)
-    objects, _ = seen_through(eyes, POLICY.grid, *truth(), key=1)
-    ahead = np.abs(objects[..., 0] - 30.0) < 3.0
-    cars = ((objects[..., 7] == 1) & ahead & (objects[..., 5] > 5.0)).any(axis=1)
-    walkers = ((objects[..., 7] == 7) & ahead).any(axis=1)
-    assert cars.mean() == pytest.approx(0.8, abs=0.06)  # 0.2 times 0 to 2
-    assert walkers.mean() < cars.mean() - 0.2
-    assert (objects[..., 8] > 0.0).sum() > cars.sum() + walkers.sum()
-    assert (np.diff(objects[..., 8], axis=1) <= 0.0).all()  # by falling score
-
-
-def test_eyes_tell_a_light_by_probabilities_that_sum_to_one():
-    _, signals = seen_through(EyeConfig(perfect=0.0), POLICY.grid, *truth(), key=1)
-    there = signals[..., 7] > 0.0
-    assert signals[there][:, 3:7].sum(axis=1) == pytest.approx(np.ones(there.sum()), abs=1e-5)
-    assert (signals[there][:, 3] > 0.5).mean() > 0.9

@@ -42,7 +42,7 @@ def test_collecting_tells_what_there_is_and_what_is_next(data, capsys):
     card = json.loads((data / "card.json").read_text())
     assert f"{card['drives']} drives with {card['moments']} moments" in out
     assert "lanefollow" in out
-    assert f"Next: driveinsight train --config small --data {data}" in out
+    assert f"Next: driveinsight train --config driveinsight --data {data}" in out
 
 
 def test_training_leaves_a_policy_that_drove_its_log_and_its_card(policy):
@@ -75,6 +75,17 @@ def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_pa
     assert "Taken from" in out
     assert "prompt (" in out
     assert "planner (" in out
+
+
+def test_a_planner_alone_is_checked_with_lent_eyes_and_the_next_step_says_so(
+    data, tmp_path, capsys
+):
+    arguments = ["--config", "tiny", "--plan-only", "--data", str(data), "--steps", "2"]
+    arguments += ["--batch", "2", "--output", str(tmp_path), "--cache", str(tmp_path / "cache")]
+    assert main(["train", *arguments, "--check-routes", "1", "--check-every", "2"]) == 0
+    assert (tmp_path / "checks.csv").is_file()
+    policy = tmp_path / "policy"
+    assert f"driveinsight evaluate --agent true-sight:{policy}" in capsys.readouterr().out
 
 
 def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy, tmp_path):
