@@ -98,7 +98,7 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
 
 def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     pytest.importorskip("torch", reason="needs the extra policy")
-    recipe, small = tmp_path / "tiny.toml", {"frames": "60", "steps": "2", "batch": "2"}
+    recipe, small = tmp_path / "tiny.toml", {"frames": "320", "steps": "2", "batch": "2"}
     text = (EXAMPLES.parent / "recipes" / "tiny.toml").read_text(encoding="utf-8")
     for name, value in small.items():
         text = re.sub(rf"^{name} = .*$", f"{name} = {value}", text, flags=re.MULTILINE)
@@ -108,13 +108,13 @@ def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     arguments += ["--workers", "1", "--route-ids", "0"]
     text = printed("train_tiny.py", *arguments)
     assert "$ driveinsight train --recipe" in text
-    assert "Stage 4 of 4, policy-1: waypoint loss" in text
+    assert "Stage 7 of 7, tiny: waypoint loss" in text
     constant, tiny = (number(rf"{name} +│ +([\d.]+)", text) for name in ("constant", "tiny"))
     assert 0.0 <= tiny <= 100.0
     assert constant > 0.0
     again = printed("train_tiny.py", *arguments)
-    assert "All 4 stages are done" in again
-    assert "Stage 4 of 4" not in again
+    assert "All 7 stages are done" in again
+    assert "Stage 7 of 7" not in again
 
 
 LEADERBOARD_AGENT_FILE = "carla_leaderboard_agent.py"

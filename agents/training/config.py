@@ -60,6 +60,7 @@ class TrainConfig:
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
         init_from: Digest of the weights that it began from; empty for fresh ones.
+        seen: Digest of what the policy's own eyes have seen; empty where it is lent eyes.
     """
 
     steps: int = 4000
@@ -85,6 +86,7 @@ class TrainConfig:
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""
     init_from: str = ""
+    seen: str = ""
 
     def __post_init__(self) -> None:
         for name in ("steps", "batch", "threads", "processes", "measured_every"):

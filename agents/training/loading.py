@@ -273,17 +273,46 @@ def batches(
     """
     training = samples.training
     share = team.share(training.batch)
+    yield from rendered(
+        samples,
+        share.stop - share.start,
+        order(training, first_step, share),
+        batch_of,
+        workers=workers,
+    )
+
+
+def rendered(
+    samples: Dataset[Any],
+    size: int,
+    numbers: Iterator[int],
+    collate: Callable[[list[Any]], Any],
+    *,
+    workers: int,
+) -> Generator[Any, None, None]:
+    """Batches of samples by their numbers, each rendered when it is wanted, or ahead of time.
+
+    Args:
+        samples: All there are.
+        size: Of a batch.
+        numbers: Of the samples, one batch after the other.
+        collate: Makes a batch of samples.
+        workers: Processes that render ahead of time; 0 renders here.
+
+    Raises:
+        TrainingError: If a drive cannot be rendered; says why.
+    """
     ahead: dict[str, Any] = {}
     if workers:
         torch.multiprocessing.set_sharing_strategy("file_system")
         ahead = {"multiprocessing_context": "spawn", "prefetch_factor": PREFETCHED}
     loader = DataLoader(
         samples,
-        batch_size=share.stop - share.start,
-        sampler=order(training, first_step, share),
-        collate_fn=batch_of,
+        batch_size=size,
+        sampler=numbers,
+        collate_fn=collate,
         num_workers=workers,
-        worker_init_fn=begin_worker,
+        worker_init_fn=_begin_worker,
         **ahead,
     )
     try:
@@ -293,7 +322,7 @@ def batches(
         raise TrainingError(last.rpartition("Error: ")[2]) from error
 
 
-def begin_worker(_: int) -> None:
+def _begin_worker(_: int) -> None:
     """Lets the process that trains stop its workers, when it has saved.
 
     A worker leaves without tidying its interpreter up: torch may still be sending a batch that

@@ -12,14 +12,14 @@ import pickle
 import time
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import Dataset
 
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.heads import Heads
@@ -34,9 +34,16 @@ from agents.driveinsight.perception_losses import (
 from agents.driveinsight.weights import save_pretrained
 from agents.training.config import TrainingError
 from agents.training.frames import RecordedDrive, read_drive
-from agents.training.loading import PREFETCHED, begin_worker, load_moments, town_of
 from agents.training.loading import Moments as Chosen
+from agents.training.loading import load_moments, rendered, town_of
 from agents.training.log import append_row, forget_rows_after
+from agents.training.loop import (
+    CHECKPOINT_EVERY_S,
+    CHECKPOINT_FILE,
+    LOG_EVERY,
+    LOG_FILE,
+    POLICY_FOLDER,
+)
 from agents.training.perception_metrics import figures, perception_sums
 from agents.training.predictions import on_device
 from agents.training.sequences import Moments, SequenceRenderer, joined
@@ -45,10 +52,6 @@ from di_envs.differences import differences
 from di_envs.files.json_values import to_json
 from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
-
-CHECKPOINT_FILE, LOG_FILE, POLICY_FOLDER = "checkpoint.pt", "log.csv", "policy"
-CHECKPOINT_EVERY_S = 120.0
-LOG_EVERY = 20  # steps whose mean makes a row of the log
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,25 +163,6 @@ def _order(training: PerceiveConfig, first_step: int) -> Iterator[int]:
 def _measured(training: PerceiveConfig) -> int:
     """Sequences that are measured on, in whole batches."""
     return training.measured // training.batch * training.batch
-
-
-def _batches(
-    sequences: Sequences, training: PerceiveConfig, first_step: int, workers: int
-) -> Generator[Moments, None, None]:
-    """Batches from a step on, rendered ahead of time by so many processes; 0 renders here."""
-    ahead: dict[str, Any] = {}
-    if workers:
-        torch.multiprocessing.set_sharing_strategy("file_system")
-        ahead = {"multiprocessing_context": "spawn", "prefetch_factor": PREFETCHED}
-    yield from DataLoader(
-        sequences,
-        batch_size=training.batch,
-        sampler=_order(training, first_step),
-        collate_fn=joined,
-        num_workers=workers,
-        worker_init_fn=begin_worker,
-        **ahead,
-    )
 
 
 def look(perception: Perception, moments: Moments, length: int) -> tuple[Heads, tuple[Tensor, ...]]:
@@ -373,7 +357,8 @@ def perceive(
         training.load(checkpoint)
     forget_rows_after(folder / LOG_FILE, training.step)
     sequences = Sequences(policy.config, config, chosen)
-    batches = _batches(sequences, config, training.step, workers)
+    numbers = _order(config, training.step)
+    batches = rendered(sequences, config.batch, numbers, joined, workers=workers)
     saved_s, sums, count = time.monotonic(), Counter[str](), 0
     while training.step < config.steps:
         if stop():

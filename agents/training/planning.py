@@ -22,6 +22,7 @@ from agents.driveinsight.seen import Seen
 from agents.training.caching import MomentCache
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team
+from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
 from agents.training.variation import Variation
@@ -42,6 +43,7 @@ class PlanningSamples:
         cache: Where moments come from.
         taught: Rows of the cache that are learnt from.
         kept_out: Rows that are measured on, in their order.
+        own: What the policy's own eyes have seen at these moments; None where none has looked.
     """
 
     policy: PolicyConfig
@@ -49,9 +51,16 @@ class PlanningSamples:
     cache: MomentCache
     taught: NDArray[np.int64]
     kept_out: NDArray[np.int64]
+    own: OwnEyes | None = None
 
     @classmethod
-    def of(cls, policy: PolicyConfig, training: TrainConfig, cache: MomentCache) -> PlanningSamples:
+    def of(
+        cls,
+        policy: PolicyConfig,
+        training: TrainConfig,
+        cache: MomentCache,
+        own: OwnEyes | None = None,
+    ) -> PlanningSamples:
         """Keeps some drives out, as `Moments.held_out` does."""
         taught, kept_out = cache.moments.held_out_rows(training.held_out)
         if training.overfit:
@@ -62,6 +71,7 @@ class PlanningSamples:
             cache=cache,
             taught=taught,
             kept_out=_spread(kept_out, training.measured),
+            own=own,
         )
 
     def batch(self, step: int, share: slice) -> Batch:
@@ -104,6 +114,11 @@ class PlanningSamples:
         objects = moved.rows(_whole(moments["objects"]), velocity=True)
         signals = moved.rows(_whole(moments["signals"]))
         objects, signals = seen_through(eyes, self.policy.grid, objects, signals, key)
+        if self.own is not None:
+            seen, looked = self.own.rows[rows], self.own.looked[rows, None, None]
+            own = moved.rows(_whole(seen["objects"]), velocity=True)
+            objects = np.where(looked, own, objects)
+            signals = np.where(looked, moved.rows(_whole(seen["signals"])), signals)
         inputs = Inputs(
             prompt={name: _tensor(value[share]) for name, value in _prompt(moments, moved).items()},
             present=torch.ones(share.stop - share.start, len(TOKENS)),

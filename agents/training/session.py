@@ -24,6 +24,7 @@ from agents.training.distributed import Team, joined_team
 from agents.training.learning import Training
 from agents.training.loading import Moments, Samples, batches, load_moments
 from agents.training.loop import CHECKPOINT_FILE
+from agents.training.own_eyes import digest_of_rows, own_eyes
 from agents.training.planning import PlanningSamples
 from agents.training.samples import Batch
 
@@ -42,6 +43,7 @@ class TrainingPlan:
         precision: `float32`, `bfloat16`, or `auto`: bfloat16 where the hardware has it built in.
         workers: Processes that render samples; None for the cores that are left.
         cache: Where moments are kept encoded when nothing is rendered.
+        seen: Folders of what the policy's own eyes have seen of drives; see `own_eyes`.
     """
 
     policy: PolicyConfig
@@ -53,6 +55,7 @@ class TrainingPlan:
     precision: str = "auto"
     workers: int | None = None
     cache: Path = Path("cache")
+    seen: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +143,9 @@ def _samples(
     if team.first:
         cached(moments, plan.policy.grid, plan.cache)
     team.any(False)  # the others wait until it is there
-    return PlanningSamples.of(plan.policy, config, cached(moments, plan.policy.grid, plan.cache))
+    cache = cached(moments, plan.policy.grid, plan.cache)
+    own = own_eyes(cache.moments, plan.seen) if plan.seen else None
+    return PlanningSamples.of(plan.policy, config, cache, own)
 
 
 def _filled_in(
@@ -156,6 +161,7 @@ def _filled_in(
             held_out=plan.training.held_out if learns_all else 0.0,
             data=moments.digest,
             init_from=weights,
+            seen=digest_of_rows(plan.seen),
         )
     except ValueError as error:
         raise TrainingError(str(error)) from error

@@ -13,15 +13,17 @@ from leaderboard.running.displays.recipe import clock
 def recipe_table(standings: Sequence[Standing]) -> Table:
     """A row a stage, and their sums."""
     table = Table()
-    for column in ("stage", "kind", "takes", "state"):
-        table.add_column(column)
+    table.add_column("stage", no_wrap=True)
+    table.add_column("kind", no_wrap=True)
+    table.add_column("takes")
+    table.add_column("state", no_wrap=True)
     table.add_column("time", justify="right", no_wrap=True)
     table.add_column("samples", justify="right", no_wrap=True)
     table.add_column("what came of it")
     spent_s, samples = 0.0, 0
     for standing in standings:
         stage, marker = standing.stage, standing.marker
-        row = [stage.name, stage.kind, ", ".join(stage.inputs), standing.state]
+        row = [stage.name, stage.kind, ", ".join(stage.named), standing.state]
         if marker is not None:
             spent_s, samples = spent_s + marker.spent_s, samples + marker.samples
             seen = f"{marker.samples:,}" if marker.done else ""

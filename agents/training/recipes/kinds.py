@@ -17,6 +17,7 @@ from typing import Any
 from agents.training.collect import drive_paths
 
 POLICY_FOLDER = "policy"  # of a stage that makes one
+SEEN_FOLDER = "seen"  # of one that looks at drives
 
 
 class Product(StrEnum):
@@ -24,6 +25,7 @@ class Product(StrEnum):
 
     DRIVES = "drives"
     POLICY = "policy"
+    SEEN = "seen rows"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,4 +136,5 @@ def _policy_files(folder: Path) -> list[Path]:
 _FILES: Mapping[Product, Callable[[Path], list[Path]]] = {
     Product.DRIVES: drive_paths,
     Product.POLICY: _policy_files,
+    Product.SEEN: lambda folder: sorted((folder / SEEN_FOLDER).glob("*.npy")),
 }

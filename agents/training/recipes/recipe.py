@@ -77,6 +77,12 @@ class Stage:
         return STAGE_KINDS[self.kind]
 
     @property
+    def named(self) -> tuple[str, ...]:
+        """The stages that it takes from as the recipe names them: `drives-*` for all of them."""
+        values = [getattr(self.settings, name) for name in self.takes]
+        return tuple(n for v in values for n in (v if isinstance(v, tuple) else (v,)) if n)
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of all stages that it takes from."""
         return tuple(dict.fromkeys(name for names in self.takes.values() for name in names))

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from agents.training.recipes.driving import CollectStage, CorrectStage, run_collect, run_correct
 from agents.training.recipes.kinds import Product, StageKind
+from agents.training.recipes.looking import CacheStage, run_cache
 from agents.training.recipes.perceiving import PerceiveStage, run_perceive
 from agents.training.recipes.training import PlanStage, TrainStage, run_train
 
@@ -35,11 +36,22 @@ STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
             takes={"data": Product.DRIVES, "init_from": Product.POLICY},
             run=run_perceive,
         ),
+        "cache": StageKind(
+            summary="a policy's eyes look at drives once",
+            settings=CacheStage,
+            makes=Product.SEEN,
+            takes={"eyes": Product.POLICY, "data": Product.DRIVES},
+            run=run_cache,
+        ),
         "plan": StageKind(
             summary="a planner learns alone, from encoded moments",
             settings=PlanStage,
             makes=Product.POLICY,
-            takes={"data": Product.DRIVES, "init_from": Product.POLICY},
+            takes={
+                "data": Product.DRIVES,
+                "init_from": Product.POLICY,
+                "seen": Product.SEEN,
+            },
             run=run_train,
         ),
         "train": StageKind(

@@ -11,7 +11,7 @@ from agents.driveinsight.config import config_named
 from agents.training.config import HELD_OUT, PLANNING, TrainConfig
 from agents.training.log import read_rows, write_curve
 from agents.training.loop import LOG_FILE, train
-from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
+from agents.training.recipes.kinds import POLICY_FOLDER, SEEN_FOLDER, Made, Progress, StageRun
 from agents.training.session import TrainingPlan, begin, joined
 
 _CACHE_FOLDER = "encoded-moments"  # beside the stages: what one has encoded, others find
@@ -26,6 +26,7 @@ class PlanStage:
         data: Stages whose drives it learns from.
         config: Name of the policy's configuration.
         init_from: Stage whose policy it begins with; empty for fresh weights.
+        seen: Stages whose eyes have looked at drives: of these it is shown what was seen there.
         steps: Updates of the weights.
         batch: Samples a step.
         learning_rate: At its highest.
@@ -35,6 +36,7 @@ class PlanStage:
     data: tuple[str, ...]
     config: str
     init_from: str = ""
+    seen: tuple[str, ...] = ()
     steps: int = 4000
     batch: int = 128
     learning_rate: float = 1e-3
@@ -118,6 +120,7 @@ def run_train(run: StageRun) -> Made | None:
         device=run.machine.device,
         precision=settings.precision,
         cache=run.folder.parent / _CACHE_FOLDER,
+        seen=tuple(folder / SEEN_FOLDER for folder in run.takes.get("seen", ())),
     )
     with joined(plan) as (team, device):
         session = begin(plan, team, device)

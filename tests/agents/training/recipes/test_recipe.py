@@ -23,6 +23,7 @@ def test_rounds_come_one_after_the_other_each_with_what_was_made_before_it(toy):
     assert last.settings == Add(data=("first", "more-*"), init_from="sum-1")
     assert last.takes == {"data": ("first", "more-1", "more-2"), "init_from": ("sum-1",)}
     assert last.inputs == ("first", "more-1", "more-2", "sum-1")
+    assert last.named == ("first", "more-*", "sum-1")
     assert recipe.stages[1].takes == {"data": ("first",), "init_from": ()}
 
 
