@@ -7,8 +7,9 @@ aside when a batch is made, which moves numbers and needs no rendering.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from agents.driveinsight.heads import CLASS_OF_KIND, KIND_OF_CLASS
 from agents.driveinsight.seen import OBJECT_COLUMNS, OBJECTS, SIGNAL_COLUMNS, SIGNALS
 from agents.networks.grid import GridConfig
 from agents.training.config import TrainingError
-from agents.training.frames import DriveStage, RecordedDrive, read_drive
+from agents.training.frames import DriveFileError, DriveStage, RecordedDrive, read_drive
 from agents.training.loading import Moments, town_of
 from agents.training.truth import seen_truth
 from agents.training.waypoints import expert_waypoints
@@ -62,6 +63,7 @@ MOMENT = np.dtype(
         ("valid", "u1", WAYPOINTS),
     ]
 )
+_STORED = np.dtype([("moment", "i4"), ("row", MOMENT)])  # a row of a file
 _KIND = 7  # column of an object
 # By `ActorKind`, as which of them perception takes it: a van and a car look alike
 _SEEMS = np.array(
@@ -144,51 +146,82 @@ def cached(
     *,
     on_moment: Callable[[int], None] = lambda count: None,
 ) -> MomentCache:
-    """The moments encoded, at most `MOST` of them, spread evenly; read if they are there.
+    """The moments encoded, at most `MOST` of them; those of a drive are read if they are there.
 
     Args:
         moments: Of drives.
         grid: Within which somebody is seen.
-        folder: Where the file is kept; it is named by drives and grid.
+        folder: Where there is a file for each drive, named by a hash of it and by the grid.
         on_moment: Told after each drive how many moments are done.
 
     Raises:
-        TrainingError: If a drive is of another version of its town, or the file is not whole.
+        TrainingError: If a drive is of another version of its town, or a file is not whole.
         DriveFileError: If a drive is not whole.
     """
-    kept = moments.some(MOST) if len(moments) > MOST else moments
-    sides = f"{grid.x_min_m:g}_{grid.x_max_m:g}_{grid.y_min_m:g}_{grid.y_max_m:g}"
-    path = folder / f"moments-{FORMAT}-{moments.digest}-{sides}.npy"
-    if not path.exists():
-        rows = _encoded(kept, grid, on_moment)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda file: np.save(file, rows))
-    return MomentCache(moments=kept, rows=_read(path, len(kept)))
+    kept = moments.thinned(MOST)
+    rows = np.zeros(len(kept), MOMENT)
+    shelf = _Shelf(folder=folder, grid=grid)
+    for number in np.unique(kept.drive):
+        own = np.flatnonzero(kept.drive == number)
+        rows[own] = shelf.rows(kept.paths[number], kept.moment[own])
+        on_moment(int(own[-1]) + 1)
+    return MomentCache(moments=kept, rows=rows)
 
 
-def _encoded(
-    moments: Moments, grid: GridConfig, on_moment: Callable[[int], None]
-) -> NDArray[np.void]:
-    rows = np.zeros(len(moments), MOMENT)
-    readers = dict[str, MomentReader]()
-    for number in np.unique(moments.drive):
-        drive = read_drive(moments.paths[number])
+@dataclass(frozen=True, kw_only=True)
+class _Shelf:
+    """Encoded drives in a folder.
+
+    Attributes:
+        folder: Where.
+        grid: Within which somebody is seen.
+        readers: Of towns, by their names.
+    """
+
+    folder: Path
+    grid: GridConfig
+    readers: dict[str, MomentReader] = field(default_factory=dict)
+
+    def rows(self, drive: Path, wanted: NDArray[np.int64]) -> NDArray[np.void]:
+        """Some moments of a drive, encoded now if they have not been before."""
+        path = self._path(drive)
+        if path.exists():
+            stored = _read(path)
+            where = np.searchsorted(stored["moment"], wanted).clip(max=len(stored) - 1)
+            if np.array_equal(stored["moment"][where], wanted):
+                return stored["row"][where]
+        fresh = np.zeros(len(wanted), _STORED)
+        fresh["moment"] = wanted
+        self._encode(read_drive(drive), fresh)
+        write_whole(path, lambda file: np.save(file, fresh))
+        return fresh["row"]
+
+    def _path(self, drive: Path) -> Path:
+        sides = (self.grid.x_min_m, self.grid.x_max_m, self.grid.y_min_m, self.grid.y_max_m)
+        digest = hashlib.blake2b(f"{FORMAT} {sides} ".encode(), digest_size=16)
+        try:
+            digest.update(drive.read_bytes())
+        except OSError as error:
+            raise DriveFileError(
+                f"{drive} is missing or not whole ({error!r}): run collect again"
+            ) from error
+        return self.folder / f"{digest.hexdigest()}.npy"
+
+    def _encode(self, drive: RecordedDrive, out: NDArray[np.void]) -> None:
         name = str(drive.facts["town"])
-        reader = readers.setdefault(name, MomentReader(*town_of(drive), grid))
-        for row in np.flatnonzero(moments.drive == number):
-            reader.read(drive, int(moments.moment[row]), rows[row])
-        on_moment(int((moments.drive <= number).sum()))
-    return rows
+        if name not in self.readers:
+            self.readers[name] = MomentReader(*town_of(drive), self.grid)
+        for stored in out:
+            self.readers[name].read(drive, int(stored["moment"]), stored["row"])
 
 
-def _read(path: Path, count: int) -> NDArray[np.void]:
+def _read(path: Path) -> NDArray[np.void]:
+    """Encoded moments of a drive, by rising number."""
     try:
-        rows: NDArray[np.void] = np.load(path, mmap_mode="r", allow_pickle=False)
+        stored: NDArray[np.void] = np.load(path, allow_pickle=False)
+        whole = stored.dtype == _STORED and len(stored) > 0
     except (OSError, ValueError, EOFError) as error:
         raise TrainingError(f"{path} is not whole ({error}): delete it to encode again") from error
-    if rows.dtype != MOMENT or len(rows) != count:
-        raise TrainingError(
-            f"{path} holds {len(rows)} rows of another kind, not {count} moments: delete it to "
-            f"encode again"
-        )
-    return rows
+    if not whole:
+        raise TrainingError(f"{path} holds no encoded moments: delete it to encode again")
+    return stored

@@ -30,6 +30,7 @@ from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import training_plan, training_town
 from agents.training.variation import Variation
+from di_envs.numerics.keyed_arrays import keyed_uniforms
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -67,6 +68,15 @@ class Moments:
     def some(self, count: int) -> Moments:
         """So many of them, spread evenly: to see that a policy can learn them by heart."""
         return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
+
+    def thinned(self, most: int) -> Moments:
+        """At most so many of them, keyed by drive and number: of more data, a part of the same."""
+        share = most / max(len(self), 1)
+        if share >= 1.0:
+            return self
+        names = (self.draws[self.drive] * 2.0**52).astype(np.uint64)  # one a drive
+        drawn = keyed_uniforms(names, int(Stream.AGENT), self.moment, (1,))[:, 0]
+        return self._rows(np.sort(np.argsort(drawn, kind="stable")[:most]))
 
     def held_out(self, share: float) -> tuple[Moments, Moments]:
         """Those to learn from, and those of the drives kept out; see `held_out_rows`."""

@@ -14,7 +14,7 @@ from agents.training.loop import LOG_FILE, train
 from agents.training.recipes.kinds import POLICY_FOLDER, SEEN_FOLDER, Made, Progress, StageRun
 from agents.training.session import TrainingPlan, begin, joined
 
-_CACHE_FOLDER = "encoded"  # of moments, in the folder of a stage
+_CACHE_FOLDER = "encoded-moments"  # beside the stages: what one has encoded, others find
 _MEMORY = 0.98  # of the running mean of the waypoint loss
 
 
@@ -119,7 +119,7 @@ def run_train(run: StageRun) -> Made | None:
         init_from=init_from[0] / POLICY_FOLDER if init_from else None,
         device=run.machine.device,
         precision=settings.precision,
-        cache=run.folder / _CACHE_FOLDER,
+        cache=run.folder.parent / _CACHE_FOLDER,
         seen=tuple(folder / SEEN_FOLDER for folder in run.takes.get("seen", ())),
     )
     with joined(plan) as (team, device):

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from agents.driveinsight.config import config_named
-from agents.training.caching import MOMENT, cached
+from agents.training.caching import MOMENT, MomentReader, cached
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import DriveStage, read_drive
 from agents.training.learning import Training
@@ -91,6 +91,37 @@ def test_a_cache_is_read_again_and_one_cut_off_says_what_to_do(cache, drives, tm
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(TrainingError, match=r"is not whole .*delete it to encode again"):
         cached(moments, POLICY.grid, tmp_path)
+
+
+def test_a_drive_is_encoded_once_whatever_comes_beside_it(drives, tmp_path, monkeypatch):
+    moments = load_moments([drives], standing_share=0.3)
+    first = moments._rows(np.flatnonzero(moments.drive == moments.drive[0]))
+    cached(first, POLICY.grid, tmp_path)
+    read, drives_read = MomentReader.read, set()
+
+    def noted(self, drive, moment, out):
+        drives_read.add(drive.facts["number"])
+        read(self, drive, moment, out)
+
+    monkeypatch.setattr(MomentReader, "read", noted)
+    cached(moments, POLICY.grid, tmp_path)
+    other = read_drive(moments.paths[moments.drive[-1]]).facts["number"]
+    assert drives_read == {other}
+    some = cached(moments._rows(np.arange(5, 30)), POLICY.grid, tmp_path)
+    assert drives_read == {other}
+    assert some.rows.tobytes() == cached(moments, POLICY.grid, tmp_path).rows[5:30].tobytes()
+
+
+def test_too_many_moments_are_thinned_to_a_part_of_what_fewer_drives_gave(drives):
+    moments = load_moments([drives], standing_share=0.3)
+    assert len(moments.thinned(len(moments))) == len(moments)
+    few, fewer = moments.thinned(60), moments.thinned(20)
+    names, *pairs = (
+        set(zip(m.drive.tolist(), m.moment.tolist(), strict=True)) for m in (moments, few, fewer)
+    )
+    assert (len(few), len(fewer)) == (60, 20)
+    assert pairs[1] < pairs[0] < names
+    assert (np.diff(few.drive * 10_000 + few.moment) > 0).all()  # in the order of the drives
 
 
 def test_equal_steps_give_equal_batches_whatever_came_before(cache):
