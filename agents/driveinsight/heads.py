@@ -136,7 +136,8 @@ class SignalHead(nn.Module):
         share = self.place(where.softmax(dim=1))[:, :-1]
         there = share / share.sum(dim=1, keepdim=True).clamp(min=1e-6)
         at = (mixed.flatten(2) @ there[:, :, None])[:, :, 0]  # (B, C)
-        state = self.state_logits(F.relu(self.state(torch.cat([at, lit], dim=1))))
+        # what the brightest lamps say, and what the place adds to it
+        state = lit + self.state_logits(F.relu(self.state(torch.cat([at, lit], dim=1))))
         return where, self.line(mixed), state
 
 
