@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.driveinsight.heads import CLASS_OF_KIND, KIND_OF_CLASS
 from agents.driveinsight.perception_losses import IGNORED
 from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.expert.occlusion import Buildings, buildings_of, collect_hiders, is_hidden
@@ -35,6 +36,10 @@ SIGN_M = 2.3  # above its pole's foot hangs a stop sign
 SIGNAL_AHEAD_M = 50.0  # along the lane, up to which a stop line governs the car
 ON_LANE_M = 3.0  # from a lane's middle, within which the car is on it
 
+# By `ActorKind`: which of the kinds that eyes tell apart it looks like
+_KIND_SEEN = np.array(
+    [int(KIND_OF_CLASS[CLASS_OF_KIND[k]]) if k in CLASS_OF_KIND else int(k) for k in ActorKind]
+)
 _ABSENT, _PROP = int(ActorKind.ABSENT), int(ActorKind.PROP)
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
 _STATE_OF_LIGHT = {LightState.RED: 0, LightState.YELLOW: 1, LightState.GREEN: 2}
@@ -52,13 +57,15 @@ def seen_truth(
         grid: Of the ego; whose middle lies outside it is left out, as is who is on another level.
 
     Returns:
-        Objects (N, 9), in the order of actors, the last column 1 for those in sight and 0 for those
-        hidden behind others or buildings; and signals (M, 8), M being 0 or 1.
+        Objects (N, 9), in the order of actors, of kinds that eyes tell apart (car, bicycle,
+        walker), the last column 1 for those in sight and 0 for those hidden behind others or
+        buildings; and signals (M, 8), M being 0 or 1.
     """
     state, town = view.state, view.town
     sides = np.array([grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m])
     objects = np.zeros((state.kind.size, OBJECT_COLUMNS), np.float32)
     count = _fill_objects(state, buildings_of(town), sides, objects)
+    objects[:count, 7] = _KIND_SEEN[objects[:count, 7].astype(np.int64)]
     signals = np.zeros((1, SIGNAL_COLUMNS), np.float32)
     line = governing_line(state, town.lanes, town.signals)
     if line >= 0:

@@ -52,6 +52,14 @@ def test_a_bicycle_is_told_by_place_heading_size_and_velocity_over_the_ground(sc
     assert objects.tolist() == [pytest.approx(expected, abs=1e-5)]
 
 
+def test_kinds_are_told_apart_as_eyes_can(scene):
+    put(scene, 1, 10.0, -4.0, kind=ActorKind.BUS)
+    put(scene, 2, 10.0, 4.0, kind=ActorKind.MOTORCYCLE)
+    put(scene, 3, 20.0, 4.0, kind=ActorKind.WALKER)
+    kinds = [ActorKind.CAR, ActorKind.BICYCLE, ActorKind.WALKER]
+    assert truth(scene)[0][:, 7].tolist() == kinds
+
+
 @pytest.mark.parametrize(
     ("ahead", "right", "there"),
     [(60.7, 0.0, True), (60.9, 0.0, False), (-15.9, 38.3, True), (-16.1, 0.0, False)],
