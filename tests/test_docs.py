@@ -182,7 +182,7 @@ def test_the_page_on_training_tells_every_kind_of_stage_what_it_makes_and_what_c
     for kind in STAGE_KINDS.values():
         for field in dataclasses.fields(kind.settings):
             assert f"`{field.name}`" in TRAINING or f"{field.name} =" in TRAINING, field.name
-    (example,) = blocks(TRAINING, "toml")
+    example, *_ = blocks(TRAINING, "toml")
     (tmp_path / "example.toml").write_text(example, encoding="utf-8")
     assert [stage.name for stage in read_recipe(tmp_path / "example.toml").stages][-1] == "policy-4"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from contextlib import closing
 from dataclasses import dataclass
@@ -137,7 +136,6 @@ def run_train(run: StageRun) -> Made | None:
             )
     if not done:
         return None
-    shutil.rmtree(plan.cache, ignore_errors=True)  # gigabytes, made again in a minute
     log = read_rows(run.folder / LOG_FILE)
     write_curve(run.folder / "curve.png", log, [])
     kept_out = f", {log[-1][HELD_OUT]:.3f} m on drives kept out" if HELD_OUT in log[-1] else ""
