@@ -39,6 +39,8 @@ class AgentEntry:
     packages: tuple[str, ...] = ()  # whose version can change what it does
 
 
+POLICY_FILES = ("config.json", "weights.safetensors")  # that decide what a policy does
+
 AGENTS: dict[str, AgentEntry] = {
     "expert": AgentEntry(
         entry_point="agents.expert.agent:Expert",
@@ -78,9 +80,37 @@ AGENTS: dict[str, AgentEntry] = {
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="the paper's policy: cameras, LiDAR and prompt to waypoints",
+        version=2,
+        options={"shipped": "driveinsight"},
+        data="driveinsight/weights/driveinsight",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
+    "driveinsight-told": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="a policy that is told all of the prompt and sees nothing: the bound of planning",
         version=1,
-        data="driveinsight/weights",
-        data_files=("config.json", "weights.safetensors"),
+        options={"shipped": "driveinsight-told"},
+        data="driveinsight/weights/driveinsight-told",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
+    "driveinsight-sensors": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="a policy that sees by cameras and LiDAR, and is told its way and speed alone",
+        version=1,
+        options={"shipped": "driveinsight-sensors"},
+        data="driveinsight/weights/driveinsight-sensors",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
+    "route-only": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="a policy that knows its way and speed alone (a control for whoever claims to see)",
+        version=1,
+        options={"shipped": "route-only"},
+        data="driveinsight/weights/route-only",
+        data_files=POLICY_FILES,
         packages=("torch",),
     ),
     "constant": AgentEntry(
@@ -107,9 +137,17 @@ SCHEMES: dict[str, AgentEntry] = {
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="driveinsight:FOLDER: a policy that `driveinsight train` wrote",
+        version=2,
+        argument="weights",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
+    "true-sight": AgentEntry(
+        entry_point="agents.training.true_sight:TrueSightAgent",
+        summary="true-sight:FOLDER[?eyes=blurred]: one whose eyes are the simulator (PRIVILEGED)",
         version=1,
         argument="weights",
-        data_files=("config.json", "weights.safetensors"),
+        data_files=POLICY_FILES,
         packages=("torch",),
     ),
     "sb3": AgentEntry(

@@ -25,7 +25,7 @@ from agents.explain.activation import activation_maps
 from agents.explain.look import look_at
 from agents.explain.responses import responses_at
 
-CONFIGS = ("small", "small-prompt-only", "tiny")
+CONFIGS = ("driveinsight", "driveinsight-told", "tiny")
 DECISIONS = 12  # driven first, so that there is something to remember
 
 

@@ -3,8 +3,8 @@
     python benchmarks/interventions.py
 
 CPU time of one core, with 120 vehicles in Town05. The share is that of a step of the environment
-alone, and of one with a policy's decision in it, as in an evaluation: `small`, as shipped, where
-there are cameras, `small-prompt-only` otherwise; untrained, which takes as long.
+alone, and of one with a policy's decision in it, as in an evaluation: `driveinsight` where there
+are cameras, `driveinsight-told` otherwise; untrained, which takes as long.
 """
 
 from __future__ import annotations
@@ -34,7 +34,10 @@ EDITS = (
     "shift:routing+target_point,lateral=3.5", "replace:command=LEFT", "delay:speed,steps=5",
     "blackout:camera_left", "noise:camera_front,sigma=8", "thin:lidar,keep=0.25",
 )  # fmt: skip
-GROUPS = {"small-prompt-only": ("prompt",), "small": ("camera", "lidar", "prompt", "odometry")}
+GROUPS = {
+    "driveinsight-told": ("prompt",),
+    "driveinsight": ("camera", "lidar", "prompt", "odometry"),
+}
 STAND = np.array([0.0, 0.0, 1.0], np.float32)
 
 

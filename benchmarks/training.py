@@ -10,22 +10,25 @@ from __future__ import annotations
 
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
 import tyro
 
 from agents.driveinsight.config import config_named
+from agents.training.caching import cached
 from agents.training.collect import DriveJob, drive_job, drive_paths
-from agents.training.config import TrainConfig
+from agents.training.config import PLANNING, TrainConfig
 from agents.training.learning import Training
-from agents.training.loading import Samples, batches, load_moments
+from agents.training.loading import Moments, Samples, batches, load_moments
+from agents.training.planning import PlanningSamples
 
 TOWNS = ("small_grid", "suburb")
-CONFIGS = ("small", "small-prompt-only", "tiny")
+CONFIGS = ("driveinsight", "driveinsight-told", "tiny")
 DRIVES = 8  # of each town
 BATCH = 16
+PLANNED = 128  # samples of a batch of a planner alone
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,12 +94,38 @@ def trained(samples: Samples, training: Training, name: str, steps: int) -> None
     print(f"{name}: {steps * BATCH / busy_s:.0f} samples/s trained a core")
 
 
+def planned(moments: Moments, folder: Path, name: str, steps: int) -> None:
+    """Encodes moments, draws batches of them, trains a planner alone; prints how fast."""
+    policy = config_named(name)
+    few = moments.thinned(1000)
+    cached(few, policy.grid, folder / "warm")  # towns are loaded, kernels compiled
+    began_s = time.process_time()
+    cache = cached(few, policy.grid, folder / "encoded")
+    encoded_s = time.process_time() - began_s
+    config = TrainConfig(steps=steps, batch=PLANNED, **PLANNING)
+    samples = PlanningSamples.of(policy, config, cache)
+    began_s = time.process_time()
+    ready = [samples.batch(step, slice(0, PLANNED)) for step in range(steps + 1)]
+    drawn_s = time.process_time() - began_s
+    print(f"{name}, planner alone: {len(few) / encoded_s:.0f} moments/s encoded a core, ", end="")
+    print(f"{(steps + 1) * PLANNED / drawn_s:.0f} samples/s drawn")
+    for precision in ("float32", "bfloat16"):
+        training = Training.begin(policy, replace(config, precision=precision), "cpu")
+        training.update(ready[0])
+        began_s = time.process_time()
+        for batch in ready[1:]:
+            training.update(batch)
+        rate = steps * PLANNED / (time.process_time() - began_s)
+        print(f"{name}, planner alone: {rate:.0f} samples/s trained a core, {precision}")
+
+
 def main(benchmark: Benchmark) -> None:
     """Prints all figures."""
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         collected(Path(folder))
         moments = load_moments([Path(folder) / "data"], standing_share=0.3)
+        planned(moments, Path(folder), "driveinsight", 8)
         config = TrainConfig(steps=10**6, batch=BATCH)
         for name in CONFIGS:
             policy = config_named(name)

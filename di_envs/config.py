@@ -71,8 +71,9 @@ class RouteEnvConfig:
         walkers: Number of walkers; likewise.
         weather: Name of one of CARLA's weather presets, or `route`: what the route file says, which
             it is by default where the file says any. Seen by cameras only.
-        cameras: Name of a rig, `small` (4 x 256 x 144), `paper` (4 x 1600 x 900) or `rl` (one of
-            84 x 84), or a `Rig` of one's own; for the group `camera`.
+        cameras: Name of a rig, `small` (4 x 256 x 144), `driveinsight` (these, and one of 320 x 128
+            that looks far ahead), `paper` (4 x 1600 x 900) or `rl` (one of 84 x 84), or a `Rig` of
+            one's own; for the group `camera`.
         lidar: Name of a LiDAR, `paper` (32 x 175 rays), `leaderboard` (64 x 937) or `dense`
             (32 x 1800), or a `LidarConfig` of one's own; for the group `lidar`.
         control_dt_s: Time for which an action is held, a multiple of the world tick of 0.05 s.

@@ -2,10 +2,10 @@
 
     python examples/train_tiny.py
 
-It runs `driveinsight collect`, `train` and `evaluate` as anyone would, and shows each command. The
-policy is taught twice: by the expert's drives, and by what the expert would have done in its own.
-Stopped with Ctrl-C, the same command goes on. Under ten minutes on two free cores. It needs torch:
-`pip install -c constraints.txt -e ".[policy]"`.
+It runs `driveinsight train --recipe recipes/tiny.toml` and `evaluate` as anyone would, and shows
+each command. The policy is taught twice: by the expert's drives, and by what the expert would have
+done in its own. Stopped with Ctrl-C, the same command goes on. Under ten minutes on two free cores.
+It needs torch: `pip install -c constraints.txt -e ".[policy]"`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from agents.training.recipes.recipe import read_recipe
 from di_envs.rules import rules_named
 from leaderboard.commands.cli import main as driveinsight
 from leaderboard.records.record import RunRecord
@@ -29,43 +30,25 @@ from leaderboard.scoring.score import mean_score
 from leaderboard.tables.run_tables import summary
 
 SUITE = "town05_tiny"  # 105 short routes over single crossings, in a town that training never sees
-ELSEWHERE = 1000  # the first of the drives that are corrected: none that the expert has shown
+RECIPE = Path(__file__).resolve().parents[1] / "recipes" / "tiny.toml"
 CONSOLE = Console(file=sys.stdout)  # also while a command's own output is put aside
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson:
-    """How much to teach the policy."""
+    """What is taught, and where it is put to the test."""
 
     folder: Path = Path("tiny")
     """Where everything goes."""
 
-    frames: int = 14_000
-    """Moments of the expert's driving, half a second apart."""
-
-    towns: tuple[str, ...] = ()
-    """Where it drives; all seven if none is named."""
+    recipe: Path = RECIPE
+    """How the policy is taught."""
 
     route_ids: tuple[str, ...] = ()
     """Routes of the suite that are driven in the end; all if none is named."""
 
-    corrections: int = 5_000
-    """Moments of the policy's own driving, in which the expert shows what it would have done."""
-
-    steps: int = 1200
-    """Updates of the weights in each of the two lessons."""
-
-    batch: int = 32
-    """Moments a step."""
-
-    learning_rate: float = 2e-3
-    """At its highest."""
-
     workers: int = 2
     """Processes that drive."""
-
-    seed: int = 0
-    """Of fresh weights and of all that is drawn."""
 
 
 def run(command: str, *arguments: object) -> None:
@@ -101,23 +84,13 @@ def side_by_side(runs: dict[str, RunRecord]) -> Table:
 
 
 def main(lesson: Lesson) -> None:
-    """Collects, trains, drives, and prints the table."""
-    data, corrections = lesson.folder / "data", lesson.folder / "corrections"
-    first, second = lesson.folder / "first", lesson.folder / "second"
-    workers = ("--workers", lesson.workers)
-    towns = ("--towns", *lesson.towns) if lesson.towns else ()
-    how = ("--steps", lesson.steps, "--batch", lesson.batch, "--learning-rate")
-    how = (*how, lesson.learning_rate, "--seed", lesson.seed, "--check-routes", 0)
-    learn = ("--config", "tiny", *how, "--data", data)
-    run("collect", "--frames", lesson.frames, *workers, "--output", data, *towns)
-    run("train", *learn, "--output", first)
-    own = ("--driver", f"driveinsight:{first / 'policy'}", "--first", ELSEWHERE)
-    run("collect", *own, "--frames", lesson.corrections, *workers, "--output", corrections, *towns)
-    run("train", *learn, corrections, "--init-from", first / "policy", "--output", second)
-    policy = f"driveinsight:{second / 'policy'}"
+    """Trains, drives, and prints the table."""
+    made = lesson.folder / "made"
+    run("train", "--recipe", lesson.recipe, "--output", made, "--workers", lesson.workers)
+    policy = made / read_recipe(lesson.recipe).stages[-1].name / "policy"
     runs = {
         "constant": score("constant", lesson.folder / "constant", lesson),
-        "tiny": score(policy, lesson.folder / "driven", lesson),
+        "tiny": score(f"driveinsight:{policy}", lesson.folder / "driven", lesson),
     }
     CONSOLE.print(side_by_side(runs))
     CONSOLE.print(f"Next: driveinsight report {lesson.folder / 'driven'}", highlight=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import shlex
@@ -168,6 +169,22 @@ def test_the_commands_of_the_page_on_training_parse_and_name_configurations_ther
     assert len(trained) >= 3
     assert set(trained) <= set(CONFIGS)
     assert set(CONFIGS) <= set(re.findall(r"`([^`\n]+)`", TRAINING))
+
+
+def test_the_page_on_training_tells_every_kind_of_stage_what_it_makes_and_what_can_be_set(tmp_path):
+    pytest.importorskip("torch", reason="needs the extra policy")
+    from agents.training.recipes.recipe import read_recipe
+    from agents.training.recipes.table import STAGE_KINDS
+
+    told = rows(TRAINING, 3)
+    made = {name: how.makes for name, how in STAGE_KINDS.items()}
+    assert {name: told[name][-1] for name in made if name in told} == made
+    for kind in STAGE_KINDS.values():
+        for field in dataclasses.fields(kind.settings):
+            assert f"`{field.name}`" in TRAINING or f"{field.name} =" in TRAINING, field.name
+    example, *_ = blocks(TRAINING, "toml")
+    (tmp_path / "example.toml").write_text(example, encoding="utf-8")
+    assert [stage.name for stage in read_recipe(tmp_path / "example.toml").stages][-1] == "policy-4"
 
 
 def test_the_test_command_follows_its_marker_on_one_line():

@@ -98,16 +98,23 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
 
 def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     pytest.importorskip("torch", reason="needs the extra policy")
-    arguments = ["--folder", str(tmp_path), "--towns", "small_grid", "--frames", "100"]
-    arguments += ["--corrections", "50", "--steps", "2", "--batch", "2"]
+    recipe, small = tmp_path / "tiny.toml", {"steps": "2", "frames": "20"}
+    text = (EXAMPLES.parent / "recipes" / "tiny.toml").read_text(encoding="utf-8")
+    for name, value in small.items():
+        text = re.sub(rf"^{name} = .*$", f"{name} = {value}", text, flags=re.MULTILINE)
+    text = text.replace("frames = 20", 'frames = 20\ntowns = ["small_grid"]')
+    recipe.write_text(text.replace("frames = 20", "frames = 320", 1))  # two drives of the expert
+    arguments = ["--folder", str(tmp_path), "--recipe", str(recipe)]
     arguments += ["--workers", "1", "--route-ids", "0"]
     text = printed("train_tiny.py", *arguments)
-    assert "$ driveinsight collect --frames 100" in text
-    assert text.count("Trained 2 steps") == 2
+    assert "$ driveinsight train --recipe" in text
+    assert "Stage 7 of 7, tiny: waypoint loss" in text
     constant, tiny = (number(rf"{name} +│ +([\d.]+)", text) for name in ("constant", "tiny"))
     assert 0.0 <= tiny <= 100.0
     assert constant > 0.0
-    assert printed("train_tiny.py", *arguments).count("Goes on from step 2") == 2
+    again = printed("train_tiny.py", *arguments)
+    assert "All 7 stages are done" in again
+    assert "Stage 7 of 7" not in again
 
 
 LEADERBOARD_AGENT_FILE = "carla_leaderboard_agent.py"

@@ -29,7 +29,7 @@ FLOORS = {
     ),
     "agents": (
         {"", "navigation"},
-        {"expert", "carla", "sb3", "explain"},
+        {"expert", "carla", "sb3", "explain", "networks"},
         {"driveinsight"},
         {"training"},
     ),

@@ -22,8 +22,9 @@ from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
-from agents.driveinsight.taps import editing
 from agents.driveinsight.weights import WeightsError, from_pretrained
+from agents.networks.fused import fuse_norms
+from agents.networks.taps import editing
 from agents.one_thread import one_thread
 from di_envs.actions.controllers import (
     ControllerMemory,
@@ -33,10 +34,10 @@ from di_envs.actions.controllers import (
 from di_envs.edits.text import EditText
 from di_envs.town.plan import RoutePlan
 
-SHIPPED = Path(__file__).parent / "weights"
+SHIPPED = Path(__file__).parent / "weights"  # a folder for each policy, by its name
 CONTROL_DT_S = 0.1
 
-Frame = tuple[Tensor, Tensor]  # fused BEV features (1, C, X, Y) and the pose (1, 3) of a decision
+Frame = tuple[Tensor, Tensor]  # what is remembered (1, C, X, Y) of a decision, and its pose (1, 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,14 +61,15 @@ class DriveInsightAgent:
     """Drives with a trained policy.
 
     Args:
-        weights: Folder of a policy, see `weights.save_pretrained`; None for the shipped one.
+        weights: Folder of a policy, see `weights.save_pretrained`; None for a shipped one.
+        shipped: Name of that one.
 
     Raises:
         AgentSpecError: If the folder holds no policy, or this package comes without one.
     """
 
-    def __init__(self, *, weights: str | Path | None = None) -> None:
-        self.policy = _policy(weights)
+    def __init__(self, *, weights: str | Path | None = None, shipped: str = "driveinsight") -> None:
+        self.policy = _policy(shipped, SHIPPED / shipped if weights is None else Path(weights))
         self.requires = requirements_of(self.policy.config)
         self._controller = WaypointControllerConfig(
             waypoint_dt_s=self.policy.config.planner.waypoint_dt_s
@@ -97,9 +99,9 @@ class DriveInsightAgent:
         with one_thread(), torch.inference_mode():
             inputs, output = self._decide(observation, memory)
         frames = memory.frames
-        if output.bev is not None and inputs.pose is not None:
+        if output.remembered is not None and inputs.pose is not None:
             reach = config.memory_frames * self._every
-            frames = ((output.bev, inputs.pose), *frames)[:reach]
+            frames = ((output.remembered, inputs.pose), *frames)[:reach]
         control, controllers = waypoints_to_control(
             output.waypoints[0].numpy(),
             float(observation["speed"][0]),
@@ -124,18 +126,22 @@ class DriveInsightAgent:
     def _decide(
         self, observation: Observation, memory: DriveInsightMemory
     ) -> tuple[Inputs, Output]:
-        inputs = inputs_of(self.policy.config, observation)
+        inputs = self._inputs(observation, memory)
         moment = DecisionMoment(
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
         with editing(self.policy, tap_edits(self._edits, moment)):
             return inputs, self.policy(inputs, self._bank(memory.frames))
 
+    def _inputs(self, observation: Observation, memory: DriveInsightMemory) -> Inputs:
+        return inputs_of(self.policy.config, observation)
+
     def _bank(self, frames: tuple[Frame, ...]) -> MemoryBank | None:
         """The frames that are whole multiples of the memory's step old."""
         if not frames:
             return None
-        bank = self.policy.empty_bank(1, like=frames[0][0])
+        assert self.policy.perception is not None, "who remembers has seen"
+        bank = self.policy.perception.empty_bank(1, like=frames[0][0])
         for features, pose in reversed(frames[self._every - 1 :: self._every]):
             bank = bank.remember(features, pose)
         return bank
@@ -156,13 +162,15 @@ def requirements_of(config: PolicyConfig) -> Requirements:
     )
 
 
-def _policy(weights: str | Path | None) -> Policy:
-    if weights is None and not SHIPPED.is_dir():
+def _policy(name: str, folder: Path) -> Policy:
+    if folder == SHIPPED / name and not folder.is_dir():
         raise AgentSpecError(
-            "agent 'driveinsight': this version comes without weights. Train some (docs/training.md"
-            " says how) and name their folder: driveinsight:runs/small/policy"
+            f"agent '{name}': this version comes without its weights. Train some (docs/training.md "
+            f"says how) and name their folder: driveinsight:runs/{name}/policy"
         )
     try:
-        return from_pretrained(SHIPPED if weights is None else Path(weights))
+        policy = from_pretrained(folder)
     except WeightsError as error:
         raise AgentSpecError(f"agent 'driveinsight': {error}") from error
+    fuse_norms(policy)
+    return policy

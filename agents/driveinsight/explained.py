@@ -7,9 +7,12 @@ from typing import Any, Protocol
 from torch import Tensor, nn
 
 from agents.base import Observation
-from agents.driveinsight.config import BEV, TOKENS, PolicyConfig
+from agents.driveinsight.camera import image_groups
+from agents.driveinsight.config import BEV, TOKENS, PlannerConfig, PolicyConfig
 from agents.driveinsight.model import Output, Policy
-from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
+from agents.driveinsight.seen import OBJECTS, SIGNALS
+from agents.explain.protocol import Anatomy, FeatureMap, Span, TokenGroup
+from di_envs.prompt import COMPONENTS, LIGHTS, OBSTACLES, STOP_SIGNS
 from di_envs.sensors.camera.config import rig_of
 
 
@@ -47,25 +50,42 @@ def anatomy_of(config: PolicyConfig) -> Anatomy:
     A component that the configuration never gives has a zero token, whatever happens: nothing
     responds to it, and it is left out.
     """
+    spans = token_spans(config.planner)
     groups = {
-        name: TokenGroup(tap=f"prompt.taps.{name}", keys=(place, place + 1))
-        for place, name in enumerate(TOKENS[:-1])
+        name: TokenGroup(tap=f"prompt.taps.{name}", keys=spans[name])
+        for name in COMPONENTS
         if name in config.prompt
     }
     maps: dict[str, FeatureMap] = {}
     if config.sensors:
-        first = TOKENS.index(BEV)
-        last = first + config.planner.bev_tokens**2
-        groups[BEV] = TokenGroup(tap="bev.tokens", keys=(first, last))
+        groups[BEV] = TokenGroup(tap="bev.tokens", keys=spans[BEV])
         grid = config.grid
         maps[BEV] = FeatureMap(
-            tap="memory.bev" if config.memory_frames else "fusion.bev",
+            tap="perception.memory.bev",
             extent_m=(grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m),
         )
     if config.camera is not None:
-        for item, camera in enumerate(rig_of(config.camera.rig).cameras):
-            maps[camera.name] = FeatureMap(tap="camera.features", item=item, camera=camera.name)
+        for number, group in enumerate(image_groups(rig_of(config.camera.rig))):
+            tap = f"perception.camera.views.{number}.features"
+            for item, camera in enumerate(group):
+                maps[camera.name] = FeatureMap(tap=tap, item=item, camera=camera.name)
     attention = (
         f"planner.layers.{layer}.attention.weights" for layer in range(config.planner.layers)
     )
     return Anatomy(groups=groups, attention=tuple(attention), maps=maps)
+
+
+def token_spans(config: PlannerConfig) -> dict[str, Span]:
+    """Where each component's tokens stand among all that the planner looks at."""
+    each = config.each_row
+    counts = dict.fromkeys(TOKENS, 1) | {
+        "obstacles": OBSTACLES if each else 1,
+        "traffic_lights": LIGHTS if each else 1,
+        "stop_signs": STOP_SIGNS if each else 1,
+        BEV: (OBJECTS + SIGNALS if each else 2) + 1,
+    }
+    spans, first = dict[str, Span](), 0
+    for name, count in counts.items():
+        spans[name] = (first, first + count)
+        first += count
+    return spans

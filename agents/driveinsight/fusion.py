@@ -1,7 +1,6 @@
 """Multi-modal fusion: both BEV maps to one width, concatenated, convolved, their channels weighed.
 
-Source: the paper, section 3.2, "Multi-Modal Fusion"; Hu et al., Squeeze-and-Excitation Networks,
-CVPR 2018.
+Source: the paper, section 3.2, "Multi-Modal Fusion".
 """
 
 from __future__ import annotations
@@ -11,28 +10,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Tap
-
-
-class SqueezeExcitation(nn.Module):
-    """Scales each channel by what the means of all channels say."""
-
-    def __init__(self, channels: int, squeezed: int | None = None) -> None:
-        super().__init__()
-        middle = squeezed or max(channels // 4, 8)
-        self.weigh = nn.Sequential(
-            nn.Linear(channels, middle), nn.ReLU(), nn.Linear(middle, channels), nn.Sigmoid()
-        )
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(B, C, X, Y) to the same shape."""
-        return x * self.weigh(x.mean(dim=(2, 3)))[:, :, None, None]
-
-
-def conv_block(inputs: int, outputs: int) -> nn.Sequential:
-    """A 3x3 convolution, normalised, with a ReLU."""
-    conv = nn.Conv2d(inputs, outputs, 3, padding=1, bias=False)
-    return nn.Sequential(conv, nn.BatchNorm2d(outputs), nn.ReLU())
+from agents.networks.blocks import SqueezeExcitation, conv_block
+from agents.networks.taps import Tap
 
 
 class MultiModalFusion(nn.Module):
@@ -40,10 +19,9 @@ class MultiModalFusion(nn.Module):
 
     def __init__(self, inputs: Sequence[int], width: int) -> None:
         super().__init__()
-        self.standard = nn.ModuleList(conv_block(channels, width) for channels in inputs)
+        self.standard = nn.ModuleList(conv_block(channels, width, size=1) for channels in inputs)
         self.mix = nn.Sequential(
-            conv_block(width * len(inputs), width),
-            SqueezeExcitation(width),
+            conv_block(width * len(inputs), width, size=1),
             conv_block(width, width),
             SqueezeExcitation(width),
         )

@@ -26,12 +26,10 @@ class LossConfig:
             does. Errors grow with time: without it the last waypoint, 4 s ahead, decides what is
             learned, and the first one, which the car is driven by, is off by 0.2 m where it stands.
         semantics: Of BEV features.
-        depth: Of the cameras'.
     """
 
     nearness: float = 1.0
     semantics: float = 0.5
-    depth: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +40,11 @@ class Targets:
         waypoints: (B, T, 2) [m].
         valid: (B, T) 0 or 1: where the drive went on that long.
         semantics: (B, X, Y) `BevClass`; None where there is none.
-        depth: (B, N, h, w) index of the depth bin of each feature pixel, -1 for none.
     """
 
     waypoints: Tensor
     valid: Tensor
     semantics: Tensor | None = None
-    depth: Tensor | None = None
 
 
 def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Tensor]:
@@ -56,14 +52,10 @@ def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Te
     error = (output.waypoints.float() - targets.waypoints).abs().sum(dim=2)  # (B, T)
     weights = _waypoint_weights(targets, config)
     terms = {"waypoints": (error * weights).sum() / weights.sum().clamp(min=1e-3)}
-    if output.semantics is not None and targets.semantics is not None:
-        classes = torch.tensor(_CLASS_WEIGHTS, device=output.semantics.device)
-        entropy = F.cross_entropy(output.semantics.float(), targets.semantics.long(), classes)
+    if output.heads is not None and targets.semantics is not None:
+        classes = torch.tensor(_CLASS_WEIGHTS, device=output.waypoints.device)
+        entropy = F.cross_entropy(output.heads.semantics.float(), targets.semantics.long(), classes)
         terms["semantics"] = config.semantics * entropy
-    if output.depth is not None and targets.depth is not None:
-        logits = output.depth.float().flatten(0, 1)  # (B*N, D, h, w)
-        entropy = F.cross_entropy(logits, targets.depth.flatten(0, 1).long(), ignore_index=-1)
-        terms["depth"] = config.depth * entropy
     return {**terms, "total": torch.stack(list(terms.values())).sum()}
 
 
@@ -73,8 +65,6 @@ def counts(targets: Targets, config: LossConfig) -> dict[str, Tensor]:
     if targets.semantics is not None:
         weights = torch.tensor(_CLASS_WEIGHTS, device=targets.semantics.device)
         found["semantics"] = weights[targets.semantics.long()].sum()
-    if targets.depth is not None:
-        found["depth"] = (targets.depth >= 0).sum()
     return found
 
 

@@ -1,20 +1,23 @@
 """Temporal fusion: past BEV features, brought to where the ego is now, beside the present ones.
 
-The memory bank is a value: `remember` makes a new one, and nothing is kept in the module.
+The memory bank is a value: `remember` makes a new one, and nothing is kept in the module. What is
+remembered of a moment is made from that moment alone: so each is encoded once, in training with
+gradients to all the moments that remember it.
 Source: the paper, section 3.2, "Temporal Fusion".
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.driveinsight.config import GridConfig
-from agents.driveinsight.fusion import SqueezeExcitation, conv_block
-from agents.driveinsight.taps import Tap
+from agents.networks.grid import GridConfig
+from agents.networks.taps import Tap
+from agents.networks.unet import UNet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,21 +86,75 @@ def _cell_centres(grid: GridConfig, like: Tensor) -> tuple[Tensor, Tensor]:
     return x.repeat_interleave(grid.cells), y.repeat(grid.cells)
 
 
-class TemporalFusion(nn.Module):
-    """Present and remembered BEV features to one map."""
+def bank_of_sequence(frames: Tensor, poses: Tensor, reach: int) -> MemoryBank:
+    """What is remembered at each moment of some sequences: the moments before it.
 
-    def __init__(self, width: int, frames: int, grid: GridConfig) -> None:
+    Args:
+        frames: (B, T, C, X, Y) of each moment.
+        poses: (B, T, 3) of the ego then.
+        reach: How many moments are remembered, K.
+
+    Returns:
+        Of B * T moments, those of a sequence one after the other.
+    """
+    batch, moments = frames.shape[:2]
+    features, places = [], []
+    steps = range(1, reach + 1)
+    for k in steps:
+        before = min(k, moments)
+        none = frames.new_zeros(batch, before, *frames.shape[2:])
+        features.append(torch.cat([none, frames[:, : moments - before]], dim=1))
+        nowhere = poses.new_zeros(batch, before, 3)
+        places.append(torch.cat([nowhere, poses[:, : moments - before]], dim=1))
+    there = torch.tensor([[t >= k for k in steps] for t in range(moments)], device=frames.device)
+    return MemoryBank(
+        features=torch.stack(features, dim=2).flatten(0, 1),
+        poses=torch.stack(places, dim=2).flatten(0, 1),
+        valid=there.repeat(batch, 1),
+    )
+
+
+class TemporalFusion(nn.Module):
+    """What is seen now and what is remembered, to one map that has looked far around.
+
+    Args:
+        width: Channels of the features of one moment.
+        remembered: Channels of what is remembered of it.
+        frames: Moments that are remembered.
+        widths: Of the U-Net.
+        grid: Of all maps.
+    """
+
+    def __init__(
+        self, width: int, remembered: int, frames: int, widths: Sequence[int], grid: GridConfig
+    ) -> None:
         super().__init__()
         self.grid, self.frames = grid, frames
-        self.reduce = conv_block(width * (1 + frames), width)
-        self.weigh = SqueezeExcitation(width)
+        self.keep = nn.Conv2d(width, remembered, 1) if frames else None
+        self.frame = Tap()
+        self.mix = UNet(width + frames * remembered, widths)
         self.bev = Tap()
 
-    def forward(self, features: Tensor, pose: Tensor, bank: MemoryBank) -> Tensor:
-        """(B, C, X, Y) features seen at (B, 3) `pose` to the same shape."""
-        past = [
-            warp(bank.features[:, k], bank.poses[:, k], pose, self.grid)
-            * bank.valid[:, k, None, None, None]
-            for k in range(self.frames)
-        ]
-        return self.bev(self.weigh(self.reduce(torch.cat([features, *past], dim=1))))
+    def remembered(self, features: Tensor) -> Tensor:
+        """(B, C, X, Y) features of a moment to what is remembered of it."""
+        assert self.keep is not None, "this policy has no memory"
+        return self.frame(self.keep(features))
+
+    def forward(self, features: Tensor, pose: Tensor | None, bank: MemoryBank | None) -> Tensor:
+        """Fuses.
+
+        Args:
+            features: (B, C, X, Y) seen now.
+            pose: (B, 3) of the ego now; None without a memory.
+            bank: What is remembered; None without a memory.
+
+        Returns:
+            (B, widths[0], X, Y).
+        """
+        past = []
+        for k in range(self.frames):
+            assert pose is not None, "this policy has a memory: give pose"
+            assert bank is not None, "this policy has a memory: give a bank"
+            brought = warp(bank.features[:, k], bank.poses[:, k], pose, self.grid)
+            past.append(brought * bank.valid[:, k, None, None, None])
+        return self.bev(self.mix(torch.cat([features, *past], dim=1)))

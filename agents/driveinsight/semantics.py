@@ -15,6 +15,6 @@ class BevClass(IntEnum):
     OTHER = 0
     ROAD = 1
     LINE = 2
-    STOP = 3  # a stop line whose light is red or yellow, or that has a stop sign
+    STOP = 3  # a stop line of a light, whatever it shows, or of a stop sign
     VEHICLE = 4
     WALKER = 5

@@ -6,8 +6,8 @@
     noise:TAP,sigma=0.1     Gaussian noise on every number
     identity:TAP            nothing is changed
 
-A tap is named as `tap_names` has it, such as `memory.bev` or `prompt.taps.routing`; `bev` is short
-for where the planner takes the BEV from.
+A tap is named as `tap_names` has it, such as `perception.memory.bev` or `prompt.taps.routing`;
+`bev` is short for where the planner takes the BEV from.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Edit, tap_names
+from agents.networks.taps import Edit, tap_names
 from di_envs.config import check_name
 from di_envs.edits.conditions import ALWAYS, Condition
 from di_envs.edits.text import EditError, EditText
 from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 
 BEV = "bev"
-_BEV_MAPS = ("memory.bev", "fusion.bev")  # the last one that a policy has
+_BEV_MAP = "perception.memory.bev"
 _BEV_TOKENS = "bev.tokens"
 # What each verb must be told, and up to where it goes
 _AMOUNTS = {"drop": "", "zero": "", "identity": "", "mask": "p", "noise": "sigma"}
@@ -145,8 +145,7 @@ def _chained(chain: Sequence[Edit]) -> Edit:
 def _tap(target: str, text: EditText, policy: nn.Module) -> str:
     known = tap_names(policy)
     if target == BEV and _BEV_TOKENS in known:
-        maps = [name for name in _BEV_MAPS if name in known]
-        return _BEV_TOKENS if text.verb == "drop" else maps[0]
+        return _BEV_TOKENS if text.verb == "drop" else _BEV_MAP
     try:
         check_name(target, known, "tap of the policy")
     except ValueError as error:

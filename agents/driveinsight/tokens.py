@@ -1,7 +1,8 @@
-"""Prompt components to tokens: an encoder each, and one zero token for "not given".
+"""Prompt components to tokens: an encoder each, and zero tokens for "not given".
 
 A component that is not present, because training hid it or because somebody dropped it, has its
-token zeroed *behind* its encoder, so both look the same to the planner, whatever the values were.
+tokens zeroed *behind* its encoder, so both look the same to the planner, whatever the values were.
+Where the route is not given, the other components' rows are not told along it either.
 Source: the paper, section 3.3.
 """
 
@@ -10,50 +11,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.driveinsight.taps import Tap
+from agents.driveinsight.config import PlannerConfig
+from agents.driveinsight.rows import (
+    SPEED,
+    MapEncoder,
+    ObjectEncoder,
+    SignalEncoder,
+    pose_features,
+    signals_of_lights,
+    signals_of_signs,
+)
+from agents.networks.mlp import mlp
+from agents.networks.taps import Tap
 from di_envs.prompt import COMPONENTS, ROUTING_POINTS, SPEED_HISTORY
-from di_envs.town.lanes import LightState
-from di_envs.town.map_chunks import MapKind
 from di_envs.town.plan import RoadOption
-from di_envs.world.kinds import ActorKind
-
-_METRES = 20.0  # coordinates are divided by this
-_SPEED = 10.0  # speeds [m/s] are divided by this
-
-
-def mlp(inputs: int, width: int) -> nn.Sequential:
-    """Two layers."""
-    return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, width))
-
-
-def _one_hot(column: Tensor, classes: int) -> Tensor:
-    return F.one_hot(column.long().clamp(0, classes - 1), classes).float()
-
-
-def _pose(columns: Tensor) -> Tensor:
-    """(..., 3) x, y, yaw to (..., 4) scaled place, cosine and sine."""
-    yaw = columns[..., 2:3]
-    return torch.cat([columns[..., :2] / _METRES, yaw.cos(), yaw.sin()], dim=-1)
-
-
-class SetEncoder(nn.Module):
-    """Encodes each row, then takes the largest and the mean over the valid ones."""
-
-    def __init__(self, inputs: int, width: int) -> None:
-        super().__init__()
-        self.row = mlp(inputs, width)
-        self.join = nn.Linear(2 * width, width)
-
-    def forward(self, rows: Tensor, valid: Tensor) -> Tensor:
-        """(..., K, F) rows and (..., K) 0 or 1 to (..., width); pools zeros where none is."""
-        mask = valid[..., None]
-        encoded = F.relu(self.row(rows)) * mask
-        largest = encoded.amax(dim=-2)  # ReLU: an invalid row is below any other
-        mean = encoded.sum(dim=-2) / mask.sum(dim=-2).clamp(min=1.0)
-        return self.join(torch.cat([largest, mean], dim=-1))
 
 
 class CommandEncoder(nn.Module):
@@ -65,7 +38,8 @@ class CommandEncoder(nn.Module):
         self.mix = mlp(width, width)
 
     def forward(self, command: Tensor) -> Tensor:
-        return self.mix(self.embed(command.long().reshape(len(command))))
+        """(B,) or (B, 1) to (B, 1, width)."""
+        return self.mix(self.embed(command.long().reshape(len(command), 1)))
 
 
 class TargetPointEncoder(nn.Module):
@@ -76,7 +50,8 @@ class TargetPointEncoder(nn.Module):
         self.mix = mlp(4, width)
 
     def forward(self, target: Tensor) -> Tensor:
-        return self.mix(_pose(target))
+        """(B, 3) to (B, 1, width)."""
+        return self.mix(pose_features(target))[:, None]
 
 
 class RoutingEncoder(nn.Module):
@@ -87,67 +62,10 @@ class RoutingEncoder(nn.Module):
         self.mix = nn.Sequential(nn.Linear(5 * ROUTING_POINTS, width), nn.ReLU(), mlp(width, width))
 
     def forward(self, routing: Tensor) -> Tensor:
+        """(B, ROUTING_POINTS, 4) to (B, 1, width)."""
         valid = routing[..., 3:]
-        return self.mix((torch.cat([_pose(routing), valid], dim=-1) * valid).flatten(1))
-
-
-class MapEncoder(nn.Module):
-    """Polylines: points to a line, lines to one token."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.line = SetEncoder(2 + len(MapKind), width)
-        self.lines = SetEncoder(width, width)
-
-    def forward(self, lines: Tensor) -> Tensor:
-        valid = lines[..., 3]  # (B, M, P)
-        points = torch.cat(
-            [lines[..., :2] / _METRES, _one_hot(lines[..., 2], len(MapKind))], dim=-1
-        )
-        return self.lines(self.line(points, valid), valid.amax(dim=-1))
-
-
-class ObstacleEncoder(nn.Module):
-    """Vehicles, walkers and props around."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.rows = SetEncoder(8 + len(ActorKind), width)
-
-    def forward(self, rows: Tensor) -> Tensor:
-        features = torch.cat(
-            [
-                _pose(rows),
-                rows[..., 3:5] / 5.0,  # length and width
-                rows[..., 5:7] / _SPEED,
-                _one_hot(rows[..., 7], len(ActorKind)),
-            ],
-            dim=-1,
-        )
-        return self.rows(features, rows[..., 8])
-
-
-class LightEncoder(nn.Module):
-    """Stop lines with lights, and their states."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.rows = SetEncoder(4 + len(LightState), width)
-
-    def forward(self, rows: Tensor) -> Tensor:
-        state = _one_hot(rows[..., 3], len(LightState))
-        return self.rows(torch.cat([_pose(rows), state], dim=-1), rows[..., 4])
-
-
-class StopSignEncoder(nn.Module):
-    """Stop lines with signs."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.rows = SetEncoder(4, width)
-
-    def forward(self, rows: Tensor) -> Tensor:
-        return self.rows(_pose(rows), rows[..., 3])
+        points = torch.cat([pose_features(routing), valid], dim=-1) * valid
+        return self.mix(points.flatten(1))[:, None]
 
 
 class SpeedEncoder(nn.Module):
@@ -158,30 +76,27 @@ class SpeedEncoder(nn.Module):
         self.mix = mlp(speeds, width)
 
     def forward(self, speeds: Tensor) -> Tensor:
-        return self.mix(speeds / _SPEED)
+        """(B, speeds) to (B, 1, width)."""
+        return self.mix(speeds / SPEED)[:, None]
 
 
 class PromptEncoder(nn.Module):
-    """The prompt to one token a component, in the order of `COMPONENTS`."""
+    """The prompt to tokens by component, in the order of `COMPONENTS`."""
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, config: PlannerConfig) -> None:
         super().__init__()
-        self.encoders = nn.ModuleDict(
-            {
-                "command": CommandEncoder(width),
-                "target_point": TargetPointEncoder(width),
-                "routing": RoutingEncoder(width),
-                "map": MapEncoder(width),
-                "obstacles": ObstacleEncoder(width),
-                "traffic_lights": LightEncoder(width),
-                "stop_signs": StopSignEncoder(width),
-                "speed": SpeedEncoder(width, 1),
-                "speed_history": SpeedEncoder(width, SPEED_HISTORY),
-            }
-        )
+        width, each = config.width, config.each_row
+        self.command = CommandEncoder(width)
+        self.target_point = TargetPointEncoder(width)
+        self.routing = RoutingEncoder(width)
+        self.map = MapEncoder(width, each=False)
+        self.objects = ObjectEncoder(width, each=each)
+        self.signals = SignalEncoder(width, each=each)
+        self.speed = SpeedEncoder(width, 1)
+        self.speed_history = SpeedEncoder(width, SPEED_HISTORY)
         self.taps = nn.ModuleDict({name: Tap() for name in COMPONENTS})
 
-    def forward(self, prompt: Mapping[str, Tensor], present: Tensor) -> Tensor:
+    def forward(self, prompt: Mapping[str, Tensor], present: Tensor) -> list[Tensor]:
         """Encodes.
 
         Args:
@@ -189,10 +104,27 @@ class PromptEncoder(nn.Module):
             present: (B, 9) 0 or 1 in the order of `COMPONENTS`.
 
         Returns:
-            (B, 9, width); zeros for components that are not present.
+            (B, N, width) for each component; zeros for those that are not present.
         """
-        tokens = [
-            self.taps[name](self.encoders[name](prompt[name]) * present[:, n, None])
-            for n, name in enumerate(COMPONENTS)
+        route = told_route(prompt, present)
+        tokens = (
+            self.command(prompt["command"]),
+            self.target_point(prompt["target_point"]),
+            self.routing(prompt["routing"]),
+            self.map(prompt["map"], route),
+            self.objects(prompt["obstacles"], route),
+            self.signals(signals_of_lights(prompt["traffic_lights"]), route),
+            self.signals(signals_of_signs(prompt["stop_signs"]), route),
+            self.speed(prompt["speed"]),
+            self.speed_history(prompt["speed_history"]),
+        )
+        return [
+            self.taps[name](rows * present[:, n, None, None])
+            for n, (name, rows) in enumerate(zip(COMPONENTS, tokens, strict=True))
         ]
-        return torch.stack(tokens, dim=1)
+
+
+def told_route(prompt: Mapping[str, Tensor], present: Tensor) -> Tensor:
+    """(B, ROUTING_POINTS, 4) the route, without a point where it is not given."""
+    given: Tensor = prompt["routing"] * present[:, COMPONENTS.index("routing"), None, None]
+    return given

@@ -1,6 +1,7 @@
 """A policy on disk: `config.json`, `weights.safetensors`, and the model card `README.md`.
 
-Weights are loaded strictly, and only into the configuration that they were saved with.
+Weights are loaded strictly, and only into the configuration that they were saved with. On disk they
+are float16, half the size: a policy drives with weights that were rounded to it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 import safetensors.torch
 import torch
 from safetensors import SafetensorError
+from torch import Tensor
 
 from agents.driveinsight.config import FORMAT_VERSION, PolicyConfig
 from agents.driveinsight.model import Policy
@@ -33,14 +35,29 @@ def save_pretrained(policy: Policy, folder: Path, card: str) -> None:
         policy: On any device, in any mode.
         folder: Where to.
         card: Markdown: data, configuration, scores, limits.
+
+    Raises:
+        WeightsError: If a weight is no number that float16 holds.
     """
     content = {"format_version": FORMAT_VERSION, **policy.config.to_mapping()}
     write_whole(folder / CONFIG_FILE, indented(content))
     write_whole(folder / CARD_FILE, card)
-    weights = {
-        name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()
-    }
+    weights = {name: _halved(name, value) for name, value in policy.state_dict().items()}
     write_whole(folder / WEIGHTS_FILE, safetensors.torch.save(weights))
+
+
+def _halved(name: str, value: Tensor) -> Tensor:
+    """A tensor as it lies on disk: float16 for real numbers, on the CPU, contiguous."""
+    value = value.detach().cpu()
+    if not value.is_floating_point():
+        return value.contiguous()
+    halved = value.half()
+    if not torch.isfinite(halved).all():
+        raise WeightsError(
+            f"'{name}' holds numbers that float16 cannot ({float(value.abs().max()):g} at most, or "
+            f"NaN): train it again, with a lower learning rate"
+        )
+    return halved.contiguous()
 
 
 def from_pretrained(folder: Path) -> Policy:

@@ -10,14 +10,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.driveinsight.config import GridConfig
 from agents.driveinsight.semantics import BevClass
+from agents.networks.grid import GridConfig
 from di_envs.numerics.arrays import Float64, UInt8
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.scene.raster import TEXEL_M, Raster, Rectangle
 from di_envs.sensors.scene.scene import scene_of
 from di_envs.sensors.scene.tags import TAG_BITS, Tag
-from di_envs.town.lanes import LightState, SignalKind
+from di_envs.town.lanes import SignalKind
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import State
 from di_envs.world.struck import footprint
@@ -32,7 +32,6 @@ _VEHICLE, _WALKER_CLASS = int(BevClass.VEHICLE), int(BevClass.WALKER)
 _ROADS, _ROAD_LINES, _BRIDGE = int(Tag.ROADS), int(Tag.ROAD_LINES), int(Tag.BRIDGE)
 _TAG_MASK = (1 << TAG_BITS) - 1
 _ABSENT, _WALKER, _PROP = int(ActorKind.ABSENT), int(ActorKind.WALKER), int(ActorKind.PROP)
-_GREEN, _LIGHT = int(LightState.GREEN), int(SignalKind.LIGHT)
 _YIELD = int(SignalKind.YIELD)
 
 
@@ -46,15 +45,13 @@ def bev_semantics(view: WorldView, grid: GridConfig) -> NDArray[np.uint8]:
     pose = np.array([state.x[0], state.y[0], z, state.yaw[0]])
     _ground(raster, pose, sides, out)
     signals = view.town.signals
-    shown = state.light[signals.stop_signal]
-    kind = signals.kind[signals.stop_signal]
-    for row in np.flatnonzero((kind != _YIELD) & ~((kind == _LIGHT) & (shown == _GREEN))):
+    for row in np.flatnonzero(signals.kind[signals.stop_signal] != _YIELD):
         x, y, height, yaw = signals.stop_pose[row]
         if abs(height - z) < LEVEL_M:
             half, back = 0.5 * signals.stop_width_m[row], 0.5 * STOP_DEPTH_M
             x, y = x - back * math.cos(yaw), y - back * math.sin(yaw)
             line = Rectangle(float(x), float(y), float(yaw), back, float(half))
-            _box(line, pose, sides, _STOP, out)
+            mark_box(line, pose, sides, _STOP, out)
     _actors(state, pose, sides, out)
     return out
 
@@ -102,11 +99,11 @@ def _actors(state: State, pose: Float64, sides: Float64, out: UInt8) -> None:
         class_ = _WALKER_CLASS if kind == _WALKER else _VEHICLE
         half_length, half_width = footprint(state, actor)
         box = Rectangle(state.x[actor], state.y[actor], state.yaw[actor], half_length, half_width)
-        _box(box, pose, sides, class_, out)
+        mark_box(box, pose, sides, class_, out)
 
 
 @kernel
-def _box(box: Rectangle, pose: Float64, sides: Float64, class_: int, out: UInt8) -> None:
+def mark_box(box: Rectangle, pose: Float64, sides: Float64, class_: int, out: UInt8) -> None:
     """Marks the cells whose middles lie in a box, or the one that holds its middle."""
     c, s = math.cos(pose[3]), math.sin(pose[3])
     dx, dy = box.x - pose[0], box.y - pose[1]

@@ -2,7 +2,7 @@
 
 Every drive is a function of (town, number), so collecting may be stopped, gone on with, and shared
 out over any number of processes: the files are the same. Of a town the first drives are taken that
-together have the moments asked for.
+together have the moments asked for. No two numbers have a route in common.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from agents.training.frames import (
     write_drive,
     write_dropped,
 )
-from agents.training.towns import town_files
+from agents.training.hiding import EVERYTHING, Hiding, told_less
+from agents.training.towns import block_of, town_files, training_plan
 from agents.versions import agent_version
 from di_envs.differences import differences
 from di_envs.numerics.keyed_random import Stream, keyed_hash
@@ -65,12 +66,16 @@ class DriveJob:
         town: Name of the training town.
         number: Of the drive in it.
         driver: The agent that drives; any but `expert` is a learner, which the expert corrects.
+        called: What its drives call it; empty for `driver`, which may say where its weights lie.
+        hiding: What a learner is not told, in which share of its drives.
     """
 
     folder: Path
     town: str
     number: int
     driver: str = EXPERT
+    called: str = ""
+    hiding: Hiding = EVERYTHING
 
     @property
     def path(self) -> Path:
@@ -111,6 +116,8 @@ def collect(
     frames: int,
     *,
     driver: str = EXPERT,
+    called: str = "",
+    hiding: Hiding = EVERYTHING,
     first: int = 0,
     workers: int = 1,
     pool: AbstractContextManager[Pool[DriveJob, Outcome]] | None = None,
@@ -124,6 +131,8 @@ def collect(
         towns: Names of training towns.
         frames: Moments in all.
         driver: See `DriveJob`.
+        called: See `DriveJob`.
+        hiding: See `DriveJob`.
         first: Number of each town's first drive.
         workers: Drives at the same time.
         pool: Where; None for processes of this machine.
@@ -137,7 +146,14 @@ def collect(
     with pool or processes(workers) as drivers:
         for town in towns:
             jobs = (
-                DriveJob(folder=folder, town=town, number=number, driver=driver)
+                DriveJob(
+                    folder=folder,
+                    town=town,
+                    number=number,
+                    driver=driver,
+                    called=called,
+                    hiding=hiding,
+                )
                 for number in range(first, first + 10**6)
             )
             yield from _collect_town(drivers, jobs, share, workers)
@@ -150,7 +166,7 @@ def share_of(frames: int, towns: Sequence[str]) -> int:
 
 def compile_for_drives(town: str) -> None:
     """Makes a town, and has all kernels compiled that a drive needs."""
-    env = _environment(town, EXPERT)
+    env = _environment(town, 0, EXPERT)
     observation, _ = env.reset(seed=0)
     agent = load_agent(EXPERT)
     control, _ = agent.act({**observation, "world": env.view}, agent.start(env.plan, 0))
@@ -192,7 +208,7 @@ def drive_job(job: DriveJob) -> Outcome:
         return Outcome(job=job, moments=len(drive))
     drive, why = _drive(job)
     if why:
-        write_dropped(job.dropped_path, why, _driven_by(job.driver))
+        write_dropped(job.dropped_path, why, _common(job))
         return Outcome(job=job, moments=0, why=why, fresh=True)
     write_drive(job.path, drive)
     return Outcome(job=job, moments=len(drive), fresh=True)
@@ -200,17 +216,19 @@ def drive_job(job: DriveJob) -> Outcome:
 
 @lru_cache(2)
 def _driven_by(driver: str) -> Mapping[str, Any]:
-    """Who drives, and in which world: what all drives of a folder have in common."""
-    return {
-        "driver": driver,
-        "agent_version": agent_version(driver),
-        "world_version": WORLD_VERSION,
-    }
+    """Which version of a driver drives, and in which world."""
+    return {"agent_version": agent_version(driver), "world_version": WORLD_VERSION}
+
+
+def _common(job: DriveJob) -> Mapping[str, Any]:
+    """What all drives of a folder have in common."""
+    told = {} if job.driver == EXPERT else {"hiding": job.hiding.shares()}
+    return {"driver": job.called or job.driver, **_driven_by(job.driver), **told}
 
 
 def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:
     """Refuses to go on where others have driven, or in another world."""
-    ours = _driven_by(job.driver)
+    ours = _common(job)
     theirs = {name: facts.get(name) for name in ours}
     if found := differences(theirs, ours):
         said = "; ".join(difference.was_is for difference in found)
@@ -218,12 +236,12 @@ def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:
 
 
 @lru_cache(2)
-def _environment(town: str, driver: str) -> RouteEnv:
+def _environment(town: str, block: int, driver: str) -> RouteEnv:
     requires = _driver(driver).requires
     return RouteEnv(
         observations=requires.observations,
         control_dt_s=requires.control_dt_s,
-        **{**requires.options, **town_files(town).options()},
+        **{**requires.options, **town_files(town, block).options()},
     )
 
 
@@ -234,14 +252,16 @@ def _driver(driver: str) -> Agent[Any]:
 
 def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
     """A drive, and why it is not worth keeping; empty if it is."""
-    env = _environment(job.town, job.driver)
+    env = _environment(job.town, block_of(job.number), job.driver)
     seed = int(keyed_hash(job.number, int(Stream.ROUTE), 1, 0)) % 2**32
     observation, _ = env.reset(seed=seed, options={"route": job.number % len(env.route_ids)})
     shown = None
     if job.driver == EXPERT:
         log, events, finished = _driven(env, observation, seed)
     else:
-        log, shown, events, finished = corrected_drive(env, _driver(job.driver), observation, seed)
+        hidden = job.hiding.hidden_in(job.town, job.number)
+        learner = told_less(_driver(job.driver), hidden)
+        log, shown, events, finished = corrected_drive(env, learner, observation, seed)
     facts = {
         "town": job.town,
         "town_hash": env.world.town.content_hash,
@@ -250,8 +270,10 @@ def _drive(job: DriveJob) -> tuple[RecordedDrive, str]:
         "seed": seed,
         "finished": finished,
         "scenarios": _scenarios(events),
-        **_driven_by(job.driver),
+        **_common(job),
     }
+    if job.driver != EXPERT:
+        facts["hidden"] = list(hidden)
     drive = dataclasses.replace(log.drive(facts), shown=shown)
     if finished == "timeout" and shown is None:
         drive = without_standing_tail(drive)
@@ -329,8 +351,7 @@ def data_card(folder: Path) -> Mapping[str, Any]:
 
 def _commands(drive: RecordedDrive) -> Counter[str]:
     """How many moments were driven under each command."""
-    env = _environment(str(drive.facts["town"]), EXPERT)
-    plan = next(p for p in env.plans if p.route_id == drive.facts["route_id"])
+    plan = training_plan(str(drive.facts["town"]), str(drive.facts["route_id"]))
     targets = drive.whole["target_index"][:, 0]
     options = plan.option[plan.targets[targets]]
     return Counter(RoadOption(int(option)).name.lower() for option in options)

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
+from agents.driveinsight.config import TOKENS
 from agents.driveinsight.losses import LossConfig
+from agents.training.seen_noise import EyeConfig
 from agents.training.variation import NO_VARIATION, Variation
 from di_envs.config import check_name
 
-MEASURED = 64  # moments of drives kept out of training that a policy is measured on …
-MEASURED_EVERY = 200  # … after so many steps
+HELD_OUT = "held_out"  # column of the log: the waypoint loss [m] on drives kept out of training
+_TOLD = "map+obstacles+traffic_lights+stop_signs"
+# How a planner is trained alone: nothing is rendered, and it is measured without what matters
+PLANNING: Mapping[str, Any] = MappingProxyType(
+    {
+        "rendered": False,
+        "measured_moments": 512,
+        "measured_every": 500,
+        "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
+    }
+)
 
 
 class TrainingError(Exception):
@@ -38,10 +51,16 @@ class TrainConfig:
         precision: `float32`, or `bfloat16` for products and convolutions (mixed precision).
         processes: That share each batch (`distributed`); another number gives other bits.
         held_out: Share of the drives that is kept out of training, to measure by.
+        measured_moments: So many moments of these are looked at …
+        measured_every: … after so many steps.
+        without: … given all, and without these components, joined by '+'.
+        rendered: Whether sensors are; False learns to plan alone, from what truly is in sight.
+        eyes: How bad the eyes are that see it.
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
         init_from: Digest of the weights that it began from; empty for fresh ones.
+        seen: Digest of what the policy's own eyes have seen; empty where it is lent eyes.
     """
 
     steps: int = 4000
@@ -58,13 +77,19 @@ class TrainConfig:
     precision: str = "float32"
     processes: int = 1
     held_out: float = 0.0
+    measured_moments: int = 64
+    measured_every: int = 200
+    without: tuple[str, ...] = ()
+    rendered: bool = True
+    eyes: EyeConfig = field(default_factory=EyeConfig)
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""
     init_from: str = ""
+    seen: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("steps", "batch", "threads", "processes"):
+        for name in ("steps", "batch", "threads", "processes", "measured_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         for name in ("overfit", "warm_up"):
@@ -77,6 +102,9 @@ class TrainConfig:
             )
         if not 0.0 <= self.held_out <= 0.5:
             raise ValueError(f"held_out must be a share from 0 to 0.5, not {self.held_out}")
+        for names in self.without:
+            for name in names.split("+"):
+                check_name(name, TOKENS, "component that a policy is measured without")
         check_name(self.precision, ("float32", "bfloat16"), "precision")
         if not self.learning_rate > 0.0:
             raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
@@ -91,11 +119,16 @@ class TrainConfig:
     @property
     def measured(self) -> int:
         """Moments of the drives kept out that are looked at each time, in whole batches."""
-        return -(-MEASURED // self.batch) * self.batch if self.held_out else 0
+        return -(-self.measured_moments // self.batch) * self.batch if self.held_out else 0
+
+    @property
+    def measures(self) -> dict[str, str]:
+        """Columns of the log for drives kept out, and what is hidden there."""
+        return {HELD_OUT: ""} | {f"{HELD_OUT} without {names}": names for names in self.without}
 
     def measured_after(self, step: int) -> bool:
         """Whether the policy is measured on these after so many steps."""
-        return self.held_out > 0.0 and (step % MEASURED_EVERY == 0 or step == self.steps)
+        return self.held_out > 0.0 and (step % self.measured_every == 0 or step == self.steps)
 
     def to_mapping(self) -> dict[str, Any]:
         """As plain values."""

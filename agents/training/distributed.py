@@ -1,6 +1,6 @@
 """Training by several processes, each with its share of every batch; `torchrun` starts them.
 
-    torchrun --nproc-per-node 2 -m leaderboard train --config small
+    torchrun --nproc-per-node 2 -m leaderboard train --config driveinsight
 
 A step is that of one process with the whole batch: each loss term is a mean over what its targets
 count, so shares are weighted by their counts before gradients are summed. (The mean of the shares'

@@ -28,7 +28,7 @@ from agents.training.frames import (
     RecordedDrive,
     read_drive,
 )
-from agents.training.towns import load_training_town
+from agents.training.towns import training_plan, training_town
 from agents.training.variation import FOURTEEN_WEATHERS
 from agents.training.waypoints import expert_waypoints
 from di_envs.config import check_name
@@ -38,8 +38,7 @@ from di_envs.observer import Observer
 from di_envs.prompt import COMPONENTS
 from di_envs.sensors.camera.config import rig_of
 from di_envs.sensors.lidar.config import lidar_of
-from di_envs.town.plan import RoadOption, RoutePlan
-from di_envs.town.town import Town
+from di_envs.town.plan import RoadOption
 from di_envs.world.state import Capacity
 
 WAYPOINTS = 8
@@ -172,22 +171,16 @@ def _samples(drive: RecordedDrive, config: ExportConfig) -> Iterator[tuple[str, 
 def _stage(
     town: str, route_id: str, capacity: Capacity, config: ExportConfig
 ) -> tuple[DriveStage, Observer]:
-    loaded, plans = _town(town)
-    plan = next(plan for plan in plans if plan.route_id == route_id)
+    loaded = training_town(town)
     observer = Observer(
         loaded,
         config.groups,
         cameras=config.cameras or "small",
         lidar=config.lidar or "paper",
     )
-    stage = DriveStage(loaded, plan, capacity)
+    stage = DriveStage(loaded, training_plan(town, route_id), capacity)
     observer.start(stage.view)
     return stage, observer
-
-
-@lru_cache(2)
-def _town(name: str) -> tuple[Town, tuple[RoutePlan, ...]]:
-    return load_training_town(name)
 
 
 def _files(

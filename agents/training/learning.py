@@ -23,7 +23,7 @@ from agents.driveinsight.model import Policy
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
-from agents.training.samples import Batch, hidden_components
+from agents.training.samples import Batch, hidden_components, without
 from di_envs.differences import differences
 from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
@@ -124,23 +124,27 @@ class Training:
         self.step += 1
         return values
 
-    def measure(self, data: Iterator[Batch]) -> float:
-        """The mean waypoint loss on moments of drives kept out of training, nothing hidden [m].
+    def measure(self, data: Iterator[Batch]) -> dict[str, float]:
+        """The mean waypoint loss on moments of drives kept out of training [m].
 
         Args:
             data: Where these moments come next; see `loading.order`.
+
+        Returns:
+            By column of the log: with nothing hidden, and without what the configuration says.
         """
         self.team.share_buffers(self.policy)
         self.policy.eval()
-        looks = self.config.measured // self.config.batch
         share = self.team.share(self.config.batch)
-        everything = torch.ones(share.stop - share.start, len(TOKENS))
+        looks = self.config.measured // self.config.batch
+        sums = dict.fromkeys(self.config.measures, 0.0)
         with torch.no_grad():
-            found = [
-                self.team.summed(self._terms(next(data), everything))["waypoints"]
-                for _ in range(looks)
-            ]
-        return sum(found) / looks
+            for _ in range(looks):
+                batch = next(data)
+                for column, names in self.config.measures.items():
+                    given = without(names, share.stop - share.start)
+                    sums[column] += self.team.summed(self._terms(batch, given))["waypoints"]
+        return {column: total / looks for column, total in sums.items()}
 
     def _terms(self, batch: Batch, hidden: Tensor) -> dict[str, Tensor]:
         """The terms of the loss; of a share, such that they sum up to the whole batch's."""
@@ -171,9 +175,12 @@ class Training:
 
 
 def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:
-    """Parameters by how fast they learn: those that see, and those that plan."""
+    """Parameters by how fast they learn: those that see, and those that plan.
+
+    Where nothing is rendered those that see stay as they are.
+    """
     seeing, planning = list[nn.Parameter](), list[nn.Parameter]()
     for name, parameter in policy.named_parameters():
         (planning if name.startswith(_PLANNING) else seeing).append(parameter)
-    groups = ((seeing, 1.0), (planning, config.planner_rate))
+    groups = ((seeing if config.rendered else [], 1.0), (planning, config.planner_rate))
     return [{"params": params, "rate": rate} for params, rate in groups if params]

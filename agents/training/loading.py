@@ -10,8 +10,9 @@ import atexit
 import hashlib
 import os
 import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,12 @@ from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
-from agents.training.towns import load_training_town
+from agents.training.towns import training_plan, training_town
 from agents.training.variation import Variation
+from di_envs.numerics.keyed_arrays import keyed_uniforms
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
+from di_envs.town.plan import RoutePlan
+from di_envs.town.town import Town
 
 STANDING_MPS = 0.1
 PREFETCHED = 4  # batches that each process renders ahead
@@ -65,14 +69,29 @@ class Moments:
         """So many of them, spread evenly: to see that a policy can learn them by heart."""
         return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
 
+    def thinned(self, most: int) -> Moments:
+        """At most so many of them, keyed by drive and number: of more data, a part of the same."""
+        share = most / max(len(self), 1)
+        if share >= 1.0:
+            return self
+        names = (self.draws[self.drive] * 2.0**52).astype(np.uint64)  # one a drive
+        drawn = keyed_uniforms(names, int(Stream.AGENT), self.moment, (1,))[:, 0]
+        return self._rows(np.sort(np.argsort(drawn, kind="stable")[:most]))
+
     def held_out(self, share: float) -> tuple[Moments, Moments]:
-        """Those to learn from, and those of the drives kept out: at least one, at most half.
+        """Those to learn from, and those of the drives kept out; see `held_out_rows`."""
+        taught, kept_out = self.held_out_rows(share)
+        return self._rows(taught), self._rows(kept_out)
+
+    def held_out_rows(self, share: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Which of them to learn from, and which are of drives kept out: one to half of these.
 
         Raises:
             TrainingError: If there are too few drives for that.
         """
+        every = np.arange(len(self))
         if not share:
-            return self, self._rows(np.zeros(0, np.int64))
+            return every, every[:0]
         drives = np.unique(self.drive)
         draws = self.draws[drives]
         count = min(max(int((draws < share).sum()), 1), len(drives) // 2)
@@ -82,7 +101,7 @@ class Moments:
                 "there is one drive alone, so none can be kept out of training to measure by: "
                 "collect more, or give --held-out 0"
             )
-        return self._rows(np.flatnonzero(~kept_out)), self._rows(np.flatnonzero(kept_out))
+        return every[~kept_out], every[kept_out]
 
     def _rows(self, rows: NDArray[np.int64]) -> Moments:
         return replace(self, drive=self.drive[rows], moment=self.moment[rows])
@@ -145,6 +164,22 @@ def _moments_of(drive: RecordedDrive, standing_share: float) -> Iterator[int]:
             yield moment
 
 
+def town_of(drive: RecordedDrive) -> tuple[Town, Callable[[str], RoutePlan]]:
+    """The town of a drive, and what plans its routes by their ids.
+
+    Raises:
+        TrainingError: If the drive was made on another version of it.
+    """
+    name = str(drive.facts["town"])
+    town = training_town(name)
+    if town.content_hash != drive.facts["town_hash"]:
+        raise TrainingError(
+            f"the drives in {name} were made on another version of that town: collect them again "
+            f"into an empty folder"
+        )
+    return town, partial(training_plan, name)
+
+
 class Samples(Dataset[Sample]):
     """Samples by their number over the whole training: step x batch + place in it.
 
@@ -201,13 +236,7 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            loaded, plans = load_training_town(town)
-            if loaded.content_hash != drive.facts["town_hash"]:
-                raise TrainingError(
-                    f"the drives in {town} were made on another version of that town: collect them "
-                    f"again into an empty folder"
-                )
-            self._renderers[town] = Renderer(self._config, loaded, plans)
+            self._renderers[town] = Renderer(self._config, *town_of(drive))
         return self._renderers[town]
 
 
@@ -244,15 +273,44 @@ def batches(
     """
     training = samples.training
     share = team.share(training.batch)
+    yield from rendered(
+        samples,
+        share.stop - share.start,
+        order(training, first_step, share),
+        batch_of,
+        workers=workers,
+    )
+
+
+def rendered(
+    samples: Dataset[Any],
+    size: int,
+    numbers: Iterator[int],
+    collate: Callable[[list[Any]], Any],
+    *,
+    workers: int,
+) -> Generator[Any, None, None]:
+    """Batches of samples by their numbers, each rendered when it is wanted, or ahead of time.
+
+    Args:
+        samples: All there are.
+        size: Of a batch.
+        numbers: Of the samples, one batch after the other.
+        collate: Makes a batch of samples.
+        workers: Processes that render ahead of time; 0 renders here.
+
+    Raises:
+        TrainingError: If a drive cannot be rendered; says why.
+    """
     ahead: dict[str, Any] = {}
     if workers:
         torch.multiprocessing.set_sharing_strategy("file_system")
         ahead = {"multiprocessing_context": "spawn", "prefetch_factor": PREFETCHED}
     loader = DataLoader(
         samples,
-        batch_size=share.stop - share.start,
-        sampler=order(training, first_step, share),
-        collate_fn=batch_of,
+        batch_size=size,
+        sampler=numbers,
+        collate_fn=collate,
         num_workers=workers,
         worker_init_fn=_begin_worker,
         **ahead,

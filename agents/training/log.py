@@ -7,9 +7,8 @@ import io
 from collections.abc import Mapping
 from pathlib import Path
 
+from agents.training.config import HELD_OUT
 from di_envs.files.whole import write_whole
-
-HELD_OUT = "held_out"  # column: the waypoint loss [m] on drives kept out of training
 
 Row = Mapping[str, float | None]
 
@@ -76,7 +75,7 @@ def write_curve(path: Path, log: list[dict[str, float]], checks: list[dict[str, 
     axes = figure.add_subplot()
     steps = [row["step"] for row in log]
     for name in log[0]:
-        if name not in ("step", "total", HELD_OUT):
+        if name not in ("step", "total") and not name.startswith(HELD_OUT):
             axes.plot(steps, [row[name] for row in log], label=name, linewidth=1.0)
     measured = [row for row in log if HELD_OUT in row]
     if measured:

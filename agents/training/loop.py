@@ -11,7 +11,7 @@ from typing import Any
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.training.learning import Training
-from agents.training.log import HELD_OUT, append_row, forget_rows_after, read_rows
+from agents.training.log import append_row, forget_rows_after, read_rows
 from agents.training.model_card import model_card
 from agents.training.samples import Batch
 
@@ -148,7 +148,7 @@ class _Loop:
         config = self.training.config
         if config.held_out:
             due = config.measured_after(self.training.step)
-            row[HELD_OUT] = self.training.measure(self.data) if due else None
+            row |= self.training.measure(self.data) if due else dict.fromkeys(config.measures)
         return row
 
     def save(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import torch
@@ -32,7 +33,7 @@ def look(
     hidden, bank = hidden.to(device), None
 
     def seen(t: int, bank: MemoryBank | None) -> tuple[Output, Inputs]:
-        inputs = _to(batch.inputs[t], device)
+        inputs = on_device(batch.inputs[t], device)
         inputs = dataclasses.replace(inputs, present=inputs.present * hidden)
         with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
             return policy(inputs, bank), inputs
@@ -40,23 +41,28 @@ def look(
     for t in range(len(batch.inputs) - 1):
         with torch.no_grad():
             output, inputs = seen(t, bank)
-        assert output.bev is not None, "only a memory needs a past"
+        assert output.remembered is not None, "only a memory needs a past"
         assert inputs.pose is not None
-        bank = bank or policy.empty_bank(len(hidden), like=output.bev)
-        bank = bank.remember(output.bev, inputs.pose)
+        assert policy.perception is not None
+        bank = bank or policy.perception.empty_bank(len(hidden), like=output.remembered)
+        bank = bank.remember(output.remembered, inputs.pose)
         begun = batch.begun[t].bool().to(device)
         valid = torch.cat([bank.valid[:, :1] & begun[:, None], bank.valid[:, 1:]], dim=1)
         bank = dataclasses.replace(bank, valid=valid)
-    return seen(len(batch.inputs) - 1, bank)[0], _to(batch.targets, device)
+    return seen(len(batch.inputs) - 1, bank)[0], on_device(batch.targets, device)
 
 
-def _to(values: Any, device: torch.device) -> Any:
-    """A bundle of tensors on a device."""
-
-    def moved(value: Any) -> Any:
-        if isinstance(value, Tensor):
-            return value.to(device, non_blocking=True)
-        return {name: moved(item) for name, item in value.items()} if value else value
-
+def on_device(values: Any, device: torch.device) -> Any:
+    """A bundle of tensors, of mappings or tuples of them, or of other bundles, on a device."""
+    if isinstance(values, Tensor):
+        return values.to(device, non_blocking=True)
+    if isinstance(values, Mapping):
+        return {name: on_device(item, device) for name, item in values.items()}
+    if isinstance(values, tuple):
+        return tuple(on_device(item, device) for item in values)
+    if values is None:
+        return None
     fields = dataclasses.fields(values)
-    return type(values)(**{field.name: moved(getattr(values, field.name)) for field in fields})
+    return type(values)(
+        **{field.name: on_device(getattr(values, field.name), device) for field in fields}
+    )

@@ -8,27 +8,26 @@ expert's true path as the way back.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.inputs import inputs_of
-from agents.driveinsight.lift import depths_m
 from agents.driveinsight.losses import Targets
 from agents.driveinsight.model import Inputs
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
-from di_envs.numerics.keyed_random import Stream, uniform
+from di_envs.numerics.keyed_arrays import keyed_uniforms
+from di_envs.numerics.keyed_random import Stream
 from di_envs.observer import Observer
-from di_envs.sensors.camera.config import Rig, rig_of
+from di_envs.sensors.camera.config import rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 
@@ -44,10 +43,11 @@ class Sample:
 class Renderer:
     """Renders samples of one town with one policy's sensors. Towns are loaded once a process."""
 
-    def __init__(self, config: PolicyConfig, town: Town, plans: Sequence[RoutePlan]) -> None:
-        self.config, self._town = config, town
-        self._plans = {plan.route_id: plan for plan in plans}
-        self._rig = _with_depth(config)
+    def __init__(
+        self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan]
+    ) -> None:
+        self.config, self._town, self._plan_of = config, town, plan_of
+        self._rig = None if config.camera is None else rig_of(config.camera.rig)
         self._stages = functools.lru_cache(64)(self._stage)
 
     def sample(
@@ -70,10 +70,10 @@ class Renderer:
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
             observation = observer.observe()
             inputs.append(inputs_of(self.config, observation))
-        return Sample(inputs=tuple(inputs), targets=self._targets(drive, last, stage, observation))
+        return Sample(inputs=tuple(inputs), targets=self._targets(drive, last, stage))
 
     def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
-        plan = self._plans[route_id]
+        plan = self._plan_of(route_id)
         lidar = self.config.lidar.lidar if self.config.lidar else "paper"
         observer = Observer(
             self._town,
@@ -85,47 +85,19 @@ class Renderer:
         observer.start(stage.view)  # once: its kernels are looked up in it, which takes a while
         return stage, observer
 
-    def _targets(
-        self, drive: RecordedDrive, moment: int, stage: DriveStage, observation: dict[str, Any]
-    ) -> Targets:
+    def _targets(self, drive: RecordedDrive, moment: int, stage: DriveStage) -> Targets:
         state = stage.view.state
         pose = np.array([state.x[0], state.y[0], state.yaw[0]])
         waypoints, valid = expert_waypoints(drive, moment, self.config.planner.waypoints, pose)
-        semantics = depth = None
+        semantics = None
         if self.config.sensors:
             truth = bev_semantics(stage.view, self.config.grid)
             semantics = torch.from_numpy(truth)[None]
-        if self._rig is not None:
-            images = [observation[f"{camera.name}_depth"] for camera in self._rig.cameras]
-            depth = torch.from_numpy(_depth_bins(self.config, images))[None]
         return Targets(
             waypoints=torch.from_numpy(waypoints)[None],
             valid=torch.from_numpy(valid)[None],
             semantics=semantics,
-            depth=depth,
         )
-
-
-def _with_depth(config: PolicyConfig) -> Rig | None:
-    """The policy's rig, with depth images to learn depths from; None without cameras."""
-    return None if config.camera is None else replace(rig_of(config.camera.rig), depth=True)
-
-
-def _depth_bins(config: PolicyConfig, images: Sequence[NDArray[np.float32]]) -> NDArray[np.int64]:
-    """(N, h, w) the nearest depth bin at the centre of each feature pixel; -1 out of range."""
-    camera = config.camera
-    assert camera is not None
-    depths = depths_m(camera)
-    step = depths[1] - depths[0]
-    rows, columns = (_feature_centres(size, camera.stride) for size in images[0].shape)
-    centres = np.stack([image[np.ix_(rows, columns)] for image in images])
-    bins = np.rint((centres - depths[0]) / step).astype(np.int64)
-    return np.where((bins >= 0) & (bins < len(depths)), bins, -1)
-
-
-def _feature_centres(size: int, stride: int) -> NDArray[np.int64]:
-    """The pixels in the middle of feature pixels; the last of these may reach over the edge."""
-    return np.minimum(np.arange(0, size, stride) + stride // 2, size - 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +137,7 @@ def _joined_inputs(parts: Sequence[Inputs]) -> Inputs:
     return Inputs(
         prompt={name: torch.cat([part.prompt[name] for part in parts]) for name in parts[0].prompt},
         present=torch.cat([part.present for part in parts]),
-        images=_joined([part.images for part in parts]),
+        images=tuple(torch.cat(group) for group in zip(*(p.images for p in parts), strict=True)),
         points=_joined([part.points for part in parts]),
         pose=_joined([part.pose for part in parts]),
     )
@@ -176,20 +148,21 @@ def _joined_targets(parts: Sequence[Targets]) -> Targets:
         waypoints=torch.cat([part.waypoints for part in parts]),
         valid=torch.cat([part.valid for part in parts]),
         semantics=_joined([part.semantics for part in parts]),
-        depth=_joined([part.depth for part in parts]),
     )
 
 
 def hidden_components(config: PolicyConfig, batch: int, key: int) -> Tensor:
     """(B, 10) 0 where training hides a component of a sample, by the rates of the config."""
-    rates = np.array([config.planner.dropout.get(name, 0.0) for name in TOKENS])
-    draws = np.array(
-        [
-            [
-                float(uniform(key, int(Stream.AGENT), n, component))
-                for component in range(len(TOKENS))
-            ]
-            for n in range(batch)
-        ]
-    )
-    return torch.from_numpy((draws >= rates).astype(np.float32))
+    rates = [config.planner.dropout.get(name, 0.0) for name in TOKENS]
+    given = keyed_uniforms(key, int(Stream.AGENT), 0, (batch, len(TOKENS))) >= np.array(rates)
+    for group, (names, rate) in enumerate(config.planner.together.items()):
+        hidden = keyed_uniforms(key, int(Stream.AGENT), 1 + group, (batch,)) < rate
+        for name in names.split("+"):
+            given[hidden, TOKENS.index(name)] = False
+    return torch.from_numpy(given.astype(np.float32))
+
+
+def without(names: str, batch: int) -> Tensor:
+    """(B, 10) 0 where a component is among names that are joined by '+'; '' is none."""
+    hidden = names.split("+")
+    return torch.tensor([[float(name not in hidden) for name in TOKENS]]).expand(batch, -1)

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from agents.training.log import HELD_OUT, read_rows
+from agents.training.config import HELD_OUT
+from agents.training.log import read_rows
 from agents.training.loop import LOG_FILE
 
 OUT = Path(__file__).resolve().parents[1] / "images" / "policy-training.png"

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from agents.training.towns import TRAINING_TOWNS, load_training_town
+from agents.training.towns import TRAINING_TOWNS, training_plans, training_town
 from di_envs.town.lanes import LaneKind, SignalKind
 
 PICTURE = Path(__file__).resolve().parents[1] / "images" / "training_towns.png"
@@ -26,7 +26,7 @@ _KINDS = {
 
 def draw_town(axes: Axes, name: str) -> None:
     """One town, north up."""
-    town, plans = load_training_town(name)
+    town, plans = training_town(name), training_plans(name)
     lanes = town.lanes
     for lane in np.flatnonzero(lanes.kind == LaneKind.DRIVING):
         points = lanes.points[lanes.first[lane] : lanes.first[lane] + lanes.count[lane]]

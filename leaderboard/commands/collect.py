@@ -18,6 +18,7 @@ from leaderboard.commands.scene_arguments import says
 if TYPE_CHECKING:
     from agents.processes import Pool
     from agents.training.collect import DriveJob, Outcome
+    from agents.training.hiding import Hiding
 
 COLLECT_HELP = """Let the expert drive in made-up towns, and keep what it did, to train policies on.
 
@@ -28,8 +29,9 @@ Examples:
 
 Kept are states, not pictures: about 1 kB each half second. Cameras and LiDAR are rendered from them
 while a policy is trained. Towns: small_grid, large_grid, suburb, highways, rural, downtown, mixed;
-all by default, and Town05 is not among them. After Ctrl-C the same command goes on; with more
---frames it adds to what is there. Drives with an infraction are dropped."""
+all by default, and Town05 is not among them: name it (town05) to have drives of it, too, over
+routes that are no suite's. After Ctrl-C the same command goes on; with more --frames it adds to
+what is there. Drives with an infraction are dropped."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class Collect:
     """Moments to have in all, half a second apart; each town gets its share."""
 
     towns: Annotated[tuple[str, ...], says("NAME ...", "all seven")] = ()
-    """Towns to drive in."""
+    """Towns to drive in: training towns, or town05."""
 
     workers: Annotated[int, says("N", "1")] = 1
     """Drives at the same time; the files are the same for any number."""
@@ -55,6 +57,10 @@ class Collect:
     driver: Annotated[str, says("AGENT", "expert")] = "expert"
     """Who drives. With another agent, such as driveinsight:runs/small/policy, what is kept is what
     the expert would have done from each moment of its drives: corrections of its mistakes."""
+
+    hidden: Annotated[tuple[str, ...], says("PART=SHARE ...", "nothing")] = ()
+    """With --driver: share of the drives in which it is not told something, such as privileged=0.3
+    (map, obstacles, lights and signs) speeds=0.1 obstacles+bev=0.1."""
 
     first: Annotated[int, says("N", "0")] = 0
     """Number of each town's first drive; it says route and seed. Begin where earlier drives ended,
@@ -74,7 +80,8 @@ class Collect:
 
         from agents.training.collect import CARD_FILE, compile_for_drives, data_card
         from agents.training.frames import FRAME_S, DriveFileError
-        from agents.training.towns import TRAINING_TOWNS
+        from agents.training.hiding import Hiding
+        from agents.training.towns import KNOWN_TOWNS, TRAINING_TOWNS
         from di_envs.config import check_name
         from di_envs.files.json_values import indented
         from di_envs.files.whole import write_whole
@@ -84,10 +91,11 @@ class Collect:
         towns = tuple(dict.fromkeys(self.towns or TRAINING_TOWNS))
         try:
             for town in towns:
-                check_name(town, TRAINING_TOWNS, "training town")
+                check_name(town, KNOWN_TOWNS, "training town")
+            hiding = Hiding.of(self._hidden())
             with compile_progress(Console(stderr=True)):
                 compile_for_drives(towns[0])
-            complete = self._collect(towns)
+            complete = self._collect(towns, hiding)
             card = data_card(self.output)
         except (ValueError, OSError, DriveFileError, SetupError) as error:
             raise UsageError(str(error)) from error
@@ -100,7 +108,7 @@ class Collect:
             return EXIT_INTERRUPTED
         say(
             f"Written: {self.output / CARD_FILE} and a file for each drive beside it.",
-            f"Next: driveinsight train --config small --data {self.output}",
+            f"Next: driveinsight train --config driveinsight --data {self.output}",
         )
         return 0
 
@@ -112,7 +120,24 @@ class Collect:
 
         return ray_pool(self.workers, self.address)
 
-    def _collect(self, towns: tuple[str, ...]) -> bool:
+    def _hidden(self) -> dict[str, float]:
+        """The shares by name.
+
+        Raises:
+            UsageError: If one is no number.
+        """
+        shares = dict[str, float]()
+        for text in self.hidden:
+            name, _, share = text.partition("=")
+            try:
+                shares[name] = float(share)
+            except ValueError as error:
+                raise UsageError(f"--hidden is PART=SHARE, such as map=0.1, not {text}") from error
+        if shares and self.driver == "expert":
+            raise UsageError("--hidden is of a learner, which is told things: add --driver AGENT")
+        return shares
+
+    def _collect(self, towns: tuple[str, ...], hiding: Hiding) -> bool:
         """Drives; returns whether all is there."""
         from agents.training.collect import collect, share_of
         from leaderboard.running.displays.work_bar import work_bar
@@ -125,6 +150,7 @@ class Collect:
             towns,
             self.frames,
             driver=self.driver,
+            hiding=hiding,
             first=self.first,
             workers=self.workers,
             pool=self._pool(),

@@ -1,7 +1,11 @@
-"""`driveinsight train`: trains a policy on collected drives; goes on where it was stopped."""
+"""`driveinsight train`: trains a policy on collected drives, or does all that a recipe says.
+
+Either goes on where it was stopped.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,37 +16,68 @@ import tyro
 from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.recipe import run_recipe_file
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
     from agents.training.session import Session, TrainingPlan
 
-TRAIN_HELP = """Train a policy on what `driveinsight collect` kept.
+TRAIN_HELP = """Train a policy on what `driveinsight collect` kept, or from nothing by a recipe.
 
 Examples:
+  driveinsight train --recipe recipes/tiny.toml                      from nothing, in ten minutes
+  driveinsight train --recipe recipes/driveinsight.toml --list       its stages, and how they stand
   driveinsight train --config tiny --steps 1500 --check-routes 2     a first try, in minutes
-  driveinsight train --config small --data data --output runs/small
-  driveinsight train --config small --init-from runs/small-prompt-only/policy
-  driveinsight train --config small --overfit 1 --steps 300          can it learn at all?
-  torchrun --nproc-per-node 4 -m leaderboard train --config small    four processes, or GPUs
+  driveinsight train --config driveinsight --data data --output runs/driveinsight
+  driveinsight train --plan-only --batch 128 --steps 20000           the planner alone, first
+  driveinsight train --init-from runs/plan/policy --planner-rate 0.3
+  driveinsight train --overfit 1 --steps 300                         can it learn at all?
+  torchrun --nproc-per-node 4 -m leaderboard train                   four processes, or GPUs
 
-Pictures are rendered while it trains, each sample in a weather of its own. Into --output go a
-checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores of routes that
-it drives on the way, and in policy/ the weights that drove best. After Ctrl-C or a crash the same
-command goes on, and comes to the same bits (on a CPU)."""
+A recipe names stages: collecting, training, rounds of corrections. Each has a folder in --output;
+cut off anywhere, the same command goes on.
+
+Without one, pictures are rendered while it trains, each sample in a weather of its own. Into
+--output go a checkpoint every two minutes, log.csv, curve.png, checks.csv with the driving scores
+of routes that it drives on the way, and in policy/ the weights that drove best. After Ctrl-C or a
+crash the same command goes on, and comes to the same bits (on a CPU)."""
+
+
+# What can be said beside a recipe
+_OF_RECIPES = ("recipe", "stage", "minutes", "listed", "output", "workers", "device")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
     """The arguments of `driveinsight train`."""
 
-    config: Annotated[str, says("NAME", "small")] = "small"
-    """Configuration of the policy: tiny, small, small-prompt-only, paper, …"""
+    recipe: Annotated[Path | None, says("FILE", "none")] = None
+    """A file that names all stages from nothing to the weights; beside it only --output, --stage,
+    --minutes, --list, --workers and --device can be said."""
+
+    stage: Annotated[str | None, says("NAME", "the recipe's last")] = None
+    """With --recipe: the last stage to do."""
+
+    minutes: Annotated[float | None, says("N", "until it is done")] = None
+    """With --recipe: stop after so long as after Ctrl-C, and go on with the next call."""
+
+    listed: Annotated[bool, tyro.conf.arg(name="list")] = False
+    """With --recipe: do nothing, show its stages, which are done, what they took."""
+
+    config: Annotated[str, says("NAME", "driveinsight")] = "driveinsight"
+    """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …"""
+
+    plan_only: bool = False
+    """Train the planner alone, by what truly is in sight instead of pictures: hundreds of samples a
+    second. What sees stays as it is, and checks are driven with lent eyes (`true-sight`)."""
+
+    cache: Annotated[Path, says("DIR", "cache")] = Path("cache")
+    """Where moments are kept encoded for --plan-only: 5 kB each, at most 100,000 of them."""
 
     data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
     """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""
 
-    output: Annotated[Path | None, says("DIR", "runs/CONFIG")] = None
+    output: Annotated[Path | None, says("DIR", "runs/CONFIG, or runs/RECIPE")] = None
     """Folder for all that is written."""
 
     steps: Annotated[int, says("N", "4000")] = 4000
@@ -60,7 +95,7 @@ class Train:
 
     workers: Annotated[int | None, says("N", "cores - 1")] = None
     """Processes that render samples; 0 renders between steps. The bits are the same. With torchrun:
-    of each of its processes."""
+    of each of its processes. With --recipe: processes that drive or render (2 by default)."""
 
     threads: Annotated[int, says("N", "1")] = 1
     """Threads of torch on a CPU; another number gives other bits."""
@@ -99,6 +134,19 @@ class Train:
             raise UsageError(
                 f"training needs torch: pip install 'driveinsight[policy]' ({error})"
             ) from error
+        if self.recipe is not None:
+            self._check_alone()
+            return run_recipe_file(
+                self.recipe,
+                self.output or Path("runs") / self.recipe.stem,
+                until=self.stage,
+                minutes=self.minutes,
+                listed=self.listed,
+                workers=self.workers,
+                device=self.device,
+            )
+        if self.stage is not None or self.minutes is not None or self.listed:
+            raise UsageError("--stage, --minutes and --list are of a recipe: add --recipe FILE")
         self._check_numbers()
 
         from agents.driveinsight.weights import WeightsError
@@ -119,6 +167,17 @@ class Train:
             (_tell_trained if done else _tell_stopped)(session)
         return 0 if done else EXIT_INTERRUPTED
 
+    def _check_alone(self) -> None:
+        """Refuses what the recipe says itself."""
+        for field in dataclasses.fields(self):
+            said = getattr(self, field.name) != field.default
+            if said and field.name not in _OF_RECIPES:
+                option = field.name.replace("_", "-")
+                raise UsageError(
+                    f"--{option} is for a training without --recipe: a recipe says it, stage by "
+                    f"stage, in its file"
+                )
+
     def _check_numbers(self) -> None:
         if self.check_every is not None and self.check_every < 1:
             raise UsageError("--check-every must be at least 1; --check-routes 0 checks nothing")
@@ -130,7 +189,7 @@ class Train:
     def _plan(self) -> TrainingPlan:
         """What the arguments ask for."""
         from agents.driveinsight.config import config_named
-        from agents.training.config import TrainConfig
+        from agents.training.config import PLANNING, TrainConfig
         from agents.training.session import TrainingPlan
 
         try:
@@ -145,6 +204,7 @@ class Train:
                 overfit=self.overfit,
                 threads=self.threads,
                 held_out=self.held_out,
+                **(PLANNING if self.plan_only else {}),
             )
         except ValueError as error:
             raise UsageError(str(error)) from error
@@ -157,6 +217,7 @@ class Train:
             device=self.device,
             precision=self.precision,
             workers=self.workers,
+            cache=self.cache,
         )
 
 
@@ -186,7 +247,8 @@ def _tell_stopped(session: Session) -> None:
 
 
 def _tell_trained(session: Session) -> None:
-    from agents.training.log import HELD_OUT, read_rows, write_curve
+    from agents.training.config import HELD_OUT
+    from agents.training.log import read_rows, write_curve
     from agents.training.loop import CHECKS_FILE, LOG_FILE, POLICY_FOLDER
 
     folder = session.plan.folder
@@ -200,7 +262,10 @@ def _tell_trained(session: Session) -> None:
         best = max(checked, key=lambda row: row["driving_score"])
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
     policy = folder / POLICY_FOLDER
+    training = session.training
+    blind = training.policy.config.sensors and not training.config.rendered
     say(
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
-        f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny",
+        f"Next: driveinsight evaluate --agent {'true-sight' if blind else 'driveinsight'}:{policy} "
+        f"--suite town05_tiny",
     )

@@ -62,7 +62,7 @@ def run_training(
             session = begin(plan, team, device)
         on_begin(session)
         with compile_progress(console):
-            session.samples[0]  # before several processes need the same kernels
+            session.warm_up()
         return session, _watched(session, check)
 
 
@@ -99,7 +99,12 @@ def _checks(
     with (
         TemporaryDirectory(prefix="driveinsight-") as folder,
         ClosedLoopCheck(
-            training.policy.config, Path(folder), plan.routes, stop=stop, on_route=show.route
+            training.policy.config,
+            Path(folder),
+            plan.routes,
+            lent_eyes=training.policy.config.sensors and not training.config.rendered,
+            stop=stop,
+            on_route=show.route,
         ) as drives,
     ):
 

@@ -11,6 +11,7 @@ from agents.driveinsight.agent import requirements_of
 from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
+from agents.training.true_sight import requirements_with_lent_eyes
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.scoring.score import mean_score
@@ -31,6 +32,7 @@ class ClosedLoopCheck:
         folder: Path,
         routes: int,
         *,
+        lent_eyes: bool = False,
         stop: Callable[[], bool],
         on_route: Callable[[int], None] = lambda number: None,
     ) -> None:
@@ -40,12 +42,15 @@ class ClosedLoopCheck:
             config: Of the policy.
             folder: Where the policy is put for its agent to load.
             routes: How many to drive.
+            lent_eyes: What truly is in sight stands in for what its sensors would see.
             stop: Asked before each route whether to leave it.
             on_route: Told the number of each route that begins.
         """
         self._folder, self._stop, self._on_route = folder, stop, on_route
-        spec = RunSpec(agent=f"driveinsight:{folder}", options={"suite": SUITE})
-        self._driver = Driver(spec, requirements_of(config))
+        scheme, needs = "driveinsight", requirements_of(config)
+        if lent_eyes:
+            scheme, needs = "true-sight", requirements_with_lent_eyes(config)
+        self._driver = Driver(RunSpec(agent=f"{scheme}:{folder}", options={"suite": SUITE}), needs)
         ids = self._driver.env.route_ids[:routes]
         self._jobs = [Job(index=n, route_id=route_id, seed=0) for n, route_id in enumerate(ids)]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from agents.driveinsight.camera import image_groups
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets
-from agents.driveinsight.model import Inputs, Output
+from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.semantics import BevClass
 from di_envs.prompt import LIGHTS, MAP_POLYLINES, OBSTACLES, ROUTING_POINTS, STOP_SIGNS
 from di_envs.sensors.camera.config import rig_of
@@ -38,11 +39,14 @@ def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int
         "speed": normal(1).abs() * 5.0,
         "speed_history": normal(4).abs() * 5.0,
     }
-    images = points = None
+    images: tuple[Tensor, ...] = ()
+    points = None
     if config.camera is not None:
-        cameras = rig_of(config.camera.rig).cameras
-        size = (batch, len(cameras), 3, cameras[0].height, cameras[0].width)
-        images = torch.randint(0, 256, size, dtype=torch.uint8, generator=draw)
+        groups = image_groups(rig_of(config.camera.rig))
+        sizes = [(batch, len(group), 3, group[0].height, group[0].width) for group in groups]
+        images = tuple(
+            torch.randint(0, 256, size, dtype=torch.uint8, generator=draw) for size in sizes
+        )
     if config.lidar is not None:
         spread, middle = torch.tensor([8.0, 8.0, 1.0, 0.2]), torch.tensor([11.0, 0.0, 1.0, 0.5])
         points = normal(rays, 4) * spread + middle
@@ -55,20 +59,24 @@ def random_inputs(config: PolicyConfig, batch: int = 1, seed: int = 0, rays: int
     )
 
 
+def awake(policy: Policy) -> Policy:
+    """A policy whose layers that begin at zero are drawn as the others are."""
+    if policy.bev is not None:
+        torch.nn.init.normal_(policy.bev.way.out.weight, std=0.1)
+    return policy
+
+
 def random_targets(output: Output, seed: int = 0) -> Targets:
     """Targets for what a policy said."""
     draw = torch.Generator().manual_seed(seed)
     batch = len(output.waypoints)
     steps = torch.rand(batch, 8, 2, generator=draw) * torch.tensor([4.0, 0.5])
-    cells = 48 if output.semantics is None else output.semantics.shape[-1]
+    cells = 48 if output.heads is None else output.heads.semantics.shape[-1]
     semantics = torch.randint(0, len(BevClass), (batch, cells, cells), generator=draw)
     return Targets(
         waypoints=steps.cumsum(1),
         valid=torch.ones(batch, 8),
-        semantics=semantics if output.semantics is not None else None,
-        depth=None
-        if output.depth is None
-        else torch.randint(-1, 24, output.depth[:, :, 0].shape, generator=draw),
+        semantics=semantics if output.heads is not None else None,
     )
 
 
@@ -81,7 +89,7 @@ def sample(inputs: Inputs, index: int) -> Inputs:
     return Inputs(
         prompt={name: value[index : index + 1] for name, value in inputs.prompt.items()},
         present=inputs.present[index : index + 1],
-        images=one(inputs.images),
+        images=tuple(group[index : index + 1] for group in inputs.images),
         points=one(inputs.points),
         pose=one(inputs.pose),
     )

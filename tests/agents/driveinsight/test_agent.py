@@ -11,21 +11,23 @@ from agents import AgentSpecError, load_agent
 from agents.base import Track
 from agents.driveinsight.config import (
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     PlannerConfig,
     PolicyConfig,
 )
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
+from agents.networks.grid import GridConfig
+from tests.agents.driveinsight.random_inputs import awake
 
 CONFIG = PolicyConfig(
     name="test",
     grid=GridConfig(cells=24),
     camera=CameraEncoderConfig(rig="rl", width=4, stride=4, channels=4, depth_bins=4),
     lidar=None,
-    planner=PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4),
+    planner=PlannerConfig(width=16, heads=2, layers=1),
     memory_frames=2,
-    bev_width=4,
+    fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
 )
 
 
@@ -33,7 +35,7 @@ CONFIG = PolicyConfig(
 def folder(tmp_path_factory):
     torch.manual_seed(3)
     path = tmp_path_factory.mktemp("policy")
-    save_pretrained(Policy(CONFIG), path, "a card")
+    save_pretrained(awake(Policy(CONFIG)), path, "a card")
     return path
 
 

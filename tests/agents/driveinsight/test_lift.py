@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 import torch
 
-from agents.driveinsight.config import CameraEncoderConfig, GridConfig
-from agents.driveinsight.lift import FrustumPooling, cells_of, depths_m, frustum_points
-from di_envs.sensors.camera.config import CameraConfig, Rig
+from agents.networks.grid import GridConfig
+from agents.networks.lift import FrustumPooling, cells_of, frustum_points, growing_depths_m
+from di_envs.sensors.camera.config import CameraConfig
 
 # 64 x 32 pixels, 90 degrees: focal length 32 px, so 4 px are 1/8 m a metre ahead.
 CAMERA = CameraConfig(name="camera_front", width=64, height=32, fov_deg=90.0, x_m=1.0, z_m=2.0)
-CONFIG = CameraEncoderConfig(stride=4, channels=2, depth_bins=5, nearest_m=4.0, farthest_m=20.0)
+DEPTHS = np.linspace(4.0, 20.0, 5)
 GRID = GridConfig()
 
 
 def pooled(camera, row, column, depth_bin):
     """A feature (3, 5) at one pixel, certain to lie at one depth, in the grid."""
-    pooling = FrustumPooling(Rig(cameras=(camera,)), CONFIG, GRID)
+    pooling = FrustumPooling([camera], 4, DEPTHS, GRID)
     features, depth = torch.zeros(1, 1, 2, 8, 16), torch.zeros(1, 1, 5, 8, 16)
     features[0, 0, :, row, column] = torch.tensor([3.0, 5.0])
     depth[0, 0, depth_bin, row, column] = 1.0
@@ -53,7 +53,7 @@ def test_what_is_deep_in_the_ground_or_out_of_range_is_left_out():
 
 
 def test_projecting_a_frustum_point_gives_its_pixel_back():
-    points = frustum_points(CAMERA, 4, depths_m(CONFIG))  # (8, 16, 5, 3)
+    points = frustum_points(CAMERA, 4, DEPTHS)  # (8, 16, 5, 3)
     seen = CAMERA.project(points[3, 11].astype(np.float64))
     assert seen[:, 0] == pytest.approx(46.0)
     assert seen[:, 1] == pytest.approx(14.0)
@@ -61,14 +61,19 @@ def test_projecting_a_frustum_point_gives_its_pixel_back():
 
 
 def test_pooling_is_the_sum_over_pixels_and_depths():
-    pooling = FrustumPooling(Rig(cameras=(CAMERA,)), CONFIG, GRID)
+    pooling = FrustumPooling([CAMERA], 4, DEPTHS, GRID)
     draw = torch.Generator().manual_seed(1)
     features = torch.randn(2, 1, 2, 8, 16, generator=draw)
     depth = torch.rand(2, 1, 5, 8, 16, generator=draw)
-    cell = cells_of(frustum_points(CAMERA, 4, depths_m(CONFIG)), GRID)
+    cell = cells_of(frustum_points(CAMERA, 4, DEPTHS), GRID)
     expected = torch.zeros(2, 2, 48, 48)
     for row, column, bin_ in np.ndindex(8, 16, 5):
         if (place := int(cell[row, column, bin_])) >= 0:
             value = features[:, 0, :, row, column] * depth[:, 0, bin_, row, column, None]
             expected[:, :, place // 48, place % 48] += value
     assert torch.allclose(pooling(features, depth), expected, atol=1e-5)
+
+
+def test_depths_grow_by_even_steps_from_the_nearest_to_the_farthest():
+    # 4 steps that grow evenly: 1, 2, 3 and 4 parts of 20 m, of 2 m each
+    assert growing_depths_m(2.0, 22.0, 5) == pytest.approx([2.0, 4.0, 8.0, 14.0, 22.0])

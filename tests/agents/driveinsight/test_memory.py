@@ -6,8 +6,8 @@ import math
 
 import torch
 
-from agents.driveinsight.config import GridConfig
-from agents.driveinsight.memory import TemporalFusion, empty_bank, warp
+from agents.driveinsight.memory import TemporalFusion, bank_of_sequence, empty_bank, warp
+from agents.networks.grid import GridConfig
 
 GRID = GridConfig()
 
@@ -51,9 +51,30 @@ def test_the_bank_keeps_the_newest_frames_and_forgets_the_oldest():
 
 
 def test_an_empty_slot_counts_for_nothing_whatever_lies_in_it():
-    fusion = TemporalFusion(1, 2, GRID).eval()
+    fusion = TemporalFusion(1, 1, 2, (4, 4), GRID).eval()
     empty = empty_bank(1, 2, 1, 48, like=torch.zeros(1))
     full = empty_bank(1, 2, 1, 48, like=torch.zeros(1))
     full.features.fill_(9.0)
     here, now = pose(0.0, 0.0, 0.0), seen_at(5, 5)
     assert torch.equal(fusion(now, here, empty), fusion(now, here, full))
+
+
+def test_in_a_sequence_each_moment_remembers_those_before_it_as_one_by_one():
+    frames = torch.randn(2, 4, 1, 8, 8, generator=torch.Generator().manual_seed(0))
+    poses = torch.arange(24.0).view(2, 4, 3)
+    whole = bank_of_sequence(frames, poses, 2)
+    bank = empty_bank(2, 2, 1, 8, like=frames)
+    for t in range(4):
+        rows = torch.tensor([t, 4 + t])  # of both sequences
+        assert torch.equal(whole.valid[rows], bank.valid)
+        there = bank.valid[..., None]
+        assert torch.equal(whole.poses[rows] * there, bank.poses * there)
+        assert torch.equal(whole.features[rows], bank.features)
+        bank = bank.remember(frames[:, t], poses[:, t])
+
+
+def test_what_is_remembered_learns_from_those_who_remember_it():
+    frames = torch.zeros(1, 3, 1, 8, 8, requires_grad=True)
+    bank = bank_of_sequence(frames, torch.zeros(1, 3, 3), 1)
+    bank.features[2].sum().backward()  # the last moment remembers the one before it
+    assert frames.grad[0].flatten(1).sum(dim=1).tolist() == [0.0, 64.0, 0.0]

@@ -12,7 +12,7 @@ from agents.driveinsight.config import (
     CONFIGS,
     TOKENS,
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     LidarEncoderConfig,
     PlannerConfig,
     PolicyConfig,
@@ -20,30 +20,38 @@ from agents.driveinsight.config import (
 )
 from agents.driveinsight.losses import LossConfig, losses
 from agents.driveinsight.model import Policy
-from agents.driveinsight.taps import editing, tap_names, watching
 from agents.driveinsight.weights import WeightsError, from_pretrained, save_pretrained
-from tests.agents.driveinsight.random_inputs import random_inputs, random_targets, sample
+from agents.networks.grid import GridConfig
+from agents.networks.taps import editing, tap_names, watching
+from tests.agents.driveinsight.random_inputs import awake, random_inputs, random_targets, sample
 
-SMALL = ["small", "small-without-cameras", "small-without-lidar", "small-prompt-only"]
+WHOLE = config_named("driveinsight")
+VARIANTS = {
+    "driveinsight": WHOLE,
+    "without-cameras": dataclasses.replace(WHOLE, camera=None),
+    "without-lidar": dataclasses.replace(WHOLE, lidar=None),
+    "driveinsight-told": config_named("driveinsight-told"),
+    "driveinsight-sensors": config_named("driveinsight-sensors"),
+}
 
 
 def new_policy(name):
     torch.manual_seed(0)
-    return Policy(config_named(name))
+    return awake(Policy(VARIANTS[name]))
 
 
 @pytest.fixture(scope="module")
 def small():
-    return new_policy("small").eval()
+    return new_policy("driveinsight").eval()
 
 
-@pytest.mark.parametrize("name", [*SMALL, "small-without-privilege"])
+@pytest.mark.parametrize("name", VARIANTS)
 def test_each_configuration_plans_eight_waypoints(name):
     policy = new_policy(name).eval()
     with torch.inference_mode():
         output = policy(random_inputs(policy.config, batch=2))
     assert output.waypoints.shape == (2, 8, 2)
-    assert (output.bev is None) == (name == "small-prompt-only")
+    assert (output.bev is None) == (name == "driveinsight-told")
 
 
 def test_a_batch_equals_its_samples_one_by_one(small):
@@ -79,7 +87,7 @@ def test_a_component_that_is_not_present_has_the_zero_token(small):
 
 
 def test_a_policy_without_privilege_reads_no_privileged_component():
-    policy = new_policy("small-without-privilege").eval()
+    policy = new_policy("driveinsight-sensors").eval()
     inputs = random_inputs(policy.config)
     other = random_inputs(policy.config, seed=3).prompt
     hidden = {name: other[name] for name in ("map", "obstacles", "traffic_lights", "stop_signs")}
@@ -90,9 +98,9 @@ def test_a_policy_without_privilege_reads_no_privileged_component():
 
 def test_memory_comes_in_and_goes_out_as_a_value(small):
     first, second = random_inputs(small.config, seed=1), random_inputs(small.config, seed=2)
-    empty = small.empty_bank(1, like=torch.zeros(1))
+    empty = small.perception.empty_bank(1, like=torch.zeros(1))
     with torch.inference_mode():
-        bank = empty.remember(small(first).bev, first.pose)
+        bank = empty.remember(small(first).remembered, first.pose)
         remembered = small(second, bank).waypoints
         again = small(second, bank).waypoints
         forgetful = small(second, empty).waypoints
@@ -100,14 +108,15 @@ def test_memory_comes_in_and_goes_out_as_a_value(small):
     assert not torch.equal(remembered, forgetful)
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", VARIANTS)
 def test_gradients_reach_every_parameter(name):
     policy = new_policy(name).train()
     inputs = random_inputs(policy.config, batch=2)
     output = policy(inputs)
     bank = None
-    if policy.memory is not None:
-        bank = policy.empty_bank(2, like=output.bev).remember(output.bev, inputs.pose)
+    if policy.config.memory_frames:
+        remembered = output.remembered
+        bank = policy.perception.empty_bank(2, like=remembered).remember(remembered, inputs.pose)
         output = policy(inputs, bank)
     losses(output, random_targets(output), LossConfig())["total"].backward()
     without = [name for name, value in policy.named_parameters() if value.grad is None]
@@ -120,9 +129,9 @@ TINY = PolicyConfig(
     name="tiny",
     grid=GridConfig(cells=16),
     camera=CameraEncoderConfig(rig="rl", width=8, channels=16, depth_bins=24),
-    lidar=LidarEncoderConfig(voxel_m=1.2, voxel_z_m=2.0, widths=(8, 16), channels=16),
-    planner=PlannerConfig(width=48, heads=4, layers=2, bev_tokens=4),
-    bev_width=16,
+    lidar=LidarEncoderConfig(channels=16),
+    planner=PlannerConfig(width=48, heads=4, layers=2),
+    fusion=FusionConfig(width=16, remembered=8, widths=(16, 16)),
 )
 
 
@@ -177,7 +186,8 @@ def test_near_waypoints_weigh_more_than_far_ones(small):
 
 def test_taps_are_named_by_their_place_and_can_be_edited(small):
     names = tap_names(small)
-    assert {"camera.depth", "lidar.bev", "fusion.bev", "memory.bev", "waypoints"} <= set(names)
+    eyes = ("camera.views.1.depth", "lidar.bev", "fusion.bev", "memory.bev", "heads.lamps.tap")
+    assert {*(f"perception.{name}" for name in eyes), "waypoints"} <= set(names)
     assert "planner.layers.0.attention.weights" in names
     inputs = random_inputs(small.config)
     with torch.inference_mode(), watching(small, "planner.layers.0.attention.weights") as seen:
@@ -191,13 +201,13 @@ def test_taps_are_named_by_their_place_and_can_be_edited(small):
     assert not torch.equal(plain, edited)
     assert torch.equal(plain, after)
     weights = seen["planner.layers.0.attention.weights"][0]
-    assert weights.shape == (1, 6, 1, 9 + 144)
+    assert weights.shape == (1, 6, 1, 9 + 3)
     assert torch.allclose(weights.sum(dim=-1), torch.ones(1, 6, 1))
 
 
 def test_an_unknown_tap_is_refused_with_a_suggestion(small):
-    unknown = r"Unknown tap 'fusion.bew'; did you mean 'fusion.bev'"
-    with pytest.raises(ValueError, match=unknown), watching(small, "fusion.bew"):
+    unknown = r"Unknown tap 'perception.fusion.bew'; did you mean 'perception.fusion.bev'"
+    with pytest.raises(ValueError, match=unknown), watching(small, "perception.fusion.bew"):
         pass
 
 
@@ -205,9 +215,21 @@ def test_a_policy_survives_the_way_to_disk_and_back(tmp_path, small):
     save_pretrained(small, tmp_path, card="# A card\n")
     loaded = from_pretrained(tmp_path)
     assert loaded.config == small.config
-    inputs = random_inputs(small.config)
-    with torch.inference_mode():
-        assert torch.equal(loaded(inputs).waypoints, small(inputs).waypoints)
+    for name, value in loaded.state_dict().items():
+        ours = small.state_dict()[name]
+        assert value.dtype == ours.dtype, name
+        assert torch.equal(value, ours.half().to(ours.dtype)), name  # float16 on disk
+    save_pretrained(loaded, tmp_path / "again", card="# A card\n")
+    first, again = (tmp_path / part / "weights.safetensors" for part in ("", "again"))
+    assert first.read_bytes() == again.read_bytes()
+
+
+def test_weights_that_float16_does_not_hold_are_not_written(tmp_path):
+    policy = Policy(config_named("route-only"))
+    with torch.no_grad():
+        policy.planner.query[0, 0, 0] = 1e5
+    with pytest.raises(WeightsError, match=r"'planner.query' holds numbers that float16 cannot"):
+        save_pretrained(policy, tmp_path, card="")
 
 
 def _full(_: int) -> None:
@@ -219,7 +241,7 @@ def test_weights_that_cannot_be_written_leave_the_old_ones(tmp_path, small, monk
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     monkeypatch.setattr(os, "fsync", _full)
     with pytest.raises(OSError, match="the disk is full"):
-        save_pretrained(new_policy("small-prompt-only"), tmp_path, card="new")
+        save_pretrained(new_policy("driveinsight-told"), tmp_path, card="new")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
@@ -232,12 +254,12 @@ def test_broken_or_foreign_weights_are_refused(tmp_path, small):
     weights.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(WeightsError, match="is not whole"):
         from_pretrained(tmp_path)
-    save_pretrained(new_policy("small-prompt-only"), tmp_path / "other", card="")
+    save_pretrained(new_policy("driveinsight-told"), tmp_path / "other", card="")
     weights.write_bytes((tmp_path / "other" / "weights.safetensors").read_bytes())
-    with pytest.raises(WeightsError, match=r"does not fit .*'small'"):
+    with pytest.raises(WeightsError, match=r"does not fit .*'driveinsight'"):
         from_pretrained(tmp_path)
     config = tmp_path / "config.json"
-    config.write_text(config.read_text().replace('"format_version": 1', '"format_version": 0'))
+    config.write_text(config.read_text().replace('"format_version": 2', '"format_version": 0'))
     with pytest.raises(WeightsError, match="is of format 0"):
         from_pretrained(tmp_path)
 
@@ -251,11 +273,11 @@ def test_a_configuration_survives_the_way_through_json(name):
 @pytest.mark.parametrize(
     ("find", "put", "says"),
     [
-        ('"cells": 48', '"cells": "48"', r"config\.json: grid\.cells: expected a whole number"),
-        ('"cells": 48', '"cells": 47', r"config\.json: grid: .* multiple of 8 cells"),
-        ('"cells": 48', '"cell": 48', r"config\.json: grid: unknown field 'cell'"),
-        ('"cells": 48', '"cells": NaN', r"config\.json: is not whole JSON: NaN"),
-        ('"name": "small",', "", r"config\.json: name: is missing"),
+        ('"cells": 96', '"cells": "96"', r"config\.json: grid\.cells: expected a whole number"),
+        ('"cells": 96', '"cells": 47', r"config\.json: grid: .* multiple of 8 cells"),
+        ('"cells": 96', '"cell": 96', r"config\.json: grid: unknown field 'cell'"),
+        ('"cells": 96', '"cells": NaN', r"config\.json: is not whole JSON: NaN"),
+        ('"name": "driveinsight",', "", r"config\.json: name: is missing"),
         ('{\n "format_version"', "[" * 100_000 + '{\n "format_version"', "nested deeper than 64"),
         ('{\n "format_version"', '["format_version"]\n#', "is not whole JSON"),
     ],
@@ -273,9 +295,10 @@ def test_a_wrong_configuration_file_says_where_it_is_wrong(tmp_path, small, find
 
 def test_wrong_configurations_are_refused_with_the_next_step():
     with pytest.raises(
-        ValueError, match=r"Unknown policy configuration 'smal'; did you mean 'smal"
+        ValueError,
+        match=r"Unknown policy configuration 'driveinsigth'; did you mean 'drivein",
     ):
-        config_named("smal")
+        config_named("driveinsigth")
     with pytest.raises(ValueError, match=r"field 'memory_frame'; did you mean 'memory_frames'"):
         PolicyConfig.from_mapping({"name": "mine", "memory_frame": 2})
     with pytest.raises(ValueError, match="needs a camera, a LiDAR or a prompt component"):

@@ -26,6 +26,8 @@ def assert_a_pass_each_way(config):
     assert output.waypoints.shape == (1, 8, 2)
     losses(output, random_targets(output), LossConfig())["total"].backward()
     for name, value in policy.named_parameters():
+        if name.startswith(("perception.memory.keep.", "bev.way.mix.")):
+            continue  # of one moment nothing is remembered; a layer that begins at zero comes next
         assert value.grad is not None, name
         assert torch.isfinite(value.grad).all(), name
         assert value.grad.abs().sum() > 0.0, name
@@ -37,7 +39,8 @@ def test_the_papers_sizes_pass_both_ways():
     if free_bytes < MEMORY_BYTES:
         pytest.skip(f"it wants {MEMORY_BYTES / 1e9:.0f} GB of memory, {free_bytes / 1e9:.1f} free")
     output = assert_a_pass_each_way(config_named("paper"))
-    assert output.depth.shape == (1, 4, 40, 57, 100)  # 900 / 16 rounded up, 1600 / 16
+    # 900 / 16 rounded up, 1600 / 16
+    assert [logits.shape for logits in output.encoded.depth] == [(1, 4, 40, 57, 100)]
     assert output.bev.shape == (1, 128, 96, 96)
 
 
@@ -45,4 +48,4 @@ def test_the_papers_network_with_small_pictures_passes_both_ways():
     paper = config_named("paper")
     camera = dataclasses.replace(paper.camera, rig="small")
     output = assert_a_pass_each_way(dataclasses.replace(paper, camera=camera))
-    assert output.depth.shape == (1, 4, 40, 9, 16)
+    assert [logits.shape for logits in output.encoded.depth] == [(1, 4, 40, 9, 16)]

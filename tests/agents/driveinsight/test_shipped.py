@@ -1,31 +1,55 @@
-"""The policy that comes with the package: whole, of the named configuration, and able to drive."""
+"""The policies that come with the package: whole, of the named configuration, and able to drive."""
 
 from __future__ import annotations
 
+import pytest
+
+from agents import AGENTS, AgentSpecError, load_agent
 from agents.driveinsight.agent import SHIPPED, requirements_of
 from agents.driveinsight.config import config_named
-from agents.driveinsight.weights import CARD_FILE, from_pretrained
+from agents.driveinsight.weights import CARD_FILE, WEIGHTS_FILE, from_pretrained
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import Job, RunSpec
 
+NAMES = [name for name, entry in AGENTS.items() if entry.data.startswith("driveinsight/weights/")]
+MOST_BYTES = 4_000_000
 
-def test_the_shipped_weights_are_of_the_configuration_small():
-    assert from_pretrained(SHIPPED).config == config_named("small")
+
+@pytest.fixture(params=NAMES)
+def shipped(request):
+    if not (SHIPPED / request.param).is_dir():
+        pytest.skip(f"this version comes without the weights of {request.param}")
+    return request.param
 
 
-def test_the_shipped_policy_has_a_card_that_says_what_it_is_trained_on_and_what_it_cannot():
-    card = (SHIPPED / CARD_FILE).read_text(encoding="utf-8")
+def test_each_shipped_agent_reads_the_folder_of_its_name():
+    for name in NAMES:
+        assert AGENTS[name].data == f"driveinsight/weights/{name}"
+        assert AGENTS[name].options == {"shipped": name}
+        config_named(name)
+
+
+def test_a_policy_that_does_not_come_with_the_package_says_what_to_do():
+    with pytest.raises(AgentSpecError, match=r"'nobody': this version comes without .* Train some"):
+        load_agent("agents.driveinsight.agent:DriveInsightAgent", shipped="nobody")
+
+
+def test_shipped_weights_are_small_and_of_the_configuration_of_their_name(shipped):
+    assert from_pretrained(SHIPPED / shipped).config == config_named(shipped)
+    assert (SHIPPED / shipped / WEIGHTS_FILE).stat().st_size <= MOST_BYTES
+
+
+def test_a_shipped_policy_has_a_card_that_says_what_it_is_trained_on_and_what_it_cannot(shipped):
+    card = (SHIPPED / shipped / CARD_FILE).read_text(encoding="utf-8")
     for part in ("## Training", "## Data", "## Scores", "## Limits"):
         assert part in card
 
 
-def test_the_shipped_policy_drives_a_crossing_to_its_end_twice_to_the_same_bits():
-    config = config_named("small")
-    spec = RunSpec(agent="driveinsight", options={"suite": "town05_tiny"})
-    with Driver(spec, requirements_of(config)) as driver:
+def test_a_shipped_policy_drives_a_crossing_to_its_end_twice_to_the_same_bits(shipped):
+    spec = RunSpec(agent=shipped, options={"suite": "town05_tiny"})
+    with Driver(spec, requirements_of(config_named(shipped))) as driver:
         job = Job(index=0, route_id=driver.env.route_ids[0], seed=0)
         first, second = driver.drive(job), driver.drive(job)
     assert not first.crashed
-    assert first.score.route_completion == 100.0
     assert first.controls == second.controls
     assert first.state_hash == second.state_hash

@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
 from agents.driveinsight.agent import DriveInsightAgent
-from agents.driveinsight.config import config_named
+from agents.driveinsight.config import PolicyConfig, config_named
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
-from agents.driveinsight.taps import editing, watching
 from agents.driveinsight.weights import save_pretrained
+from agents.networks.taps import editing, watching
 from di_envs.edits.text import EditError, read_edits
 from di_envs.observation import observation_space
 from di_envs.prompt import COMPONENTS
-from tests.agents.driveinsight.random_inputs import random_inputs
+from tests.agents.driveinsight.random_inputs import awake, random_inputs
 from wrappers.interventions import ObservationEditing
 from wrappers.interventions.context import EditContext
 
 NOW = DecisionMoment(seed=3, decision=60, time_s=6.0)
 
 
-def made(name: str) -> Policy:
+def made(config: PolicyConfig) -> Policy:
     torch.manual_seed(0)
-    return Policy(config_named(name)).eval()
+    return awake(Policy(config)).eval()
 
 
 @pytest.fixture(scope="module")
 def prompted() -> Policy:
-    return made("small-prompt-only")
+    return made(config_named("driveinsight-told"))
 
 
 @pytest.fixture(scope="module")
 def seeing() -> Policy:
-    return made("small-without-cameras")
+    return made(dataclasses.replace(config_named("driveinsight"), camera=None))
 
 
 def read(text, policy):
@@ -72,10 +74,14 @@ def test_drop_is_the_policys_zero_token_to_the_bit_and_zero_is_not(prompted, com
         tokens[verb] = (waypoints, seen[tap])
     assert not tokens["drop"][1].any()
     assert tokens["zero"][1].any()
-    # As training's dropout does it: the token is zero behind its encoder, whatever it encodes.
+    # As training's dropout does it: the token is zero behind its encoder, whatever it encodes, and
+    # without a route nobody is told where they are along it.
     whole = inputs_of(prompted.config, observation)
-    with torch.inference_mode(), editing(prompted, {tap: torch.zeros_like}):
-        dropped_out = prompted(whole).waypoints
+    kept = {} if component == "routing" else {tap: torch.zeros_like}
+    given = whole.present.clone()
+    given[:, COMPONENTS.index(component)] = float(component != "routing")
+    with torch.inference_mode(), editing(prompted, kept):
+        dropped_out = prompted(dataclasses.replace(whole, present=given)).waypoints
     assert torch.equal(tokens["drop"][0], dropped_out)
     assert not torch.equal(tokens["zero"][0], dropped_out)
     assert torch.equal(tokens["identity"][0], planned(prompted, whole)[0])
@@ -102,7 +108,7 @@ def test_a_masked_map_loses_whole_cells_and_that_share_of_them(seeing):
     inputs = random_inputs(seeing.config)
     _, plain = planned(seeing, inputs)
     _, masked = planned(seeing, inputs, "mask:bev,p=0.3")
-    before, after = plain["memory.bev"][0], masked["memory.bev"][0]
+    before, after = plain["perception.memory.bev"][0], masked["perception.memory.bev"][0]
     lost = (after == 0).all(dim=0)
     assert torch.equal(after[:, ~lost], before[:, ~lost])
     assert lost.float().mean() == pytest.approx(0.3, abs=0.05)

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from agents.expert.agent import Expert
-from agents.expert.occlusion import THIN_M, Buildings, buildings_of
+from agents.expert.occlusion import Buildings, buildings_of
 from agents.expert.visible import RANGE_M, Visible, empty_visible, see
 from di_envs.suites import choose_suite
 from di_envs.town.loading import load_town
 from di_envs.town.town import Town
 from di_envs.world.state import ActorKind, State, views_of
-from di_envs.world.world import World, WorldConfig, WorldView
+from di_envs.world.world import World, WorldConfig
+from tests.agents.expert.scrambling import scrambled
 
-# What the expert may read of the world; of actors only of those in sight
-SEEN_OF_ACTORS = {
-    *("kind", "x", "y", "z", "yaw", "speed", "half_length", "half_width", "height"),
-    *("brake_light", "indicator"),
-}
-SEEN = SEEN_OF_ACTORS | {"light"}
 NOWHERE = Buildings(*(np.zeros(0) for _ in Buildings._fields))
 
 
@@ -126,38 +119,6 @@ def test_a_town_has_buildings_that_stand_on_no_lane():
         inside = (along < buildings.half_length[row]) & (across < buildings.half_width[row])
         level = lanes.points[:, 2] < buildings.top_m[row]
         assert not (inside & level & (lanes.kind == 1)[lanes.point_lane]).any()
-
-
-def seen_by_hand(state: State, visible: Visible) -> NDArray[np.bool_]:
-    """Which actors are in sight, told by their places."""
-    places = set(zip(visible.x[: visible.seen[0]], visible.y[: visible.seen[0]], strict=True))
-    return np.array([(x, y) in places for x, y in zip(state.x, state.y, strict=True)])
-
-
-def scrambled(view: WorldView, buildings: Buildings, random: np.random.Generator) -> WorldView:
-    """The same world with all exchanged that is not seen from the ego, who is hidden too."""
-    names = [(name, getattr(view.state, name)) for name in State._fields]
-    state = State(**{name: array.copy() for name, array in names})
-    visible = empty_visible(state.kind.size, state.light.size)
-    see(view.state, view.town.lanes, view.town.signals, buildings, view.ego, False, visible)
-    hidden = ~seen_by_hand(state, visible)
-    for name in State._fields:
-        array: NDArray[Any] = getattr(state, name)
-        if name in SEEN_OF_ACTORS:
-            continue
-        if name != "light" and array.ndim:
-            array[...] = random.permutation(array)
-            array[...] += random.integers(0, 3, array.shape).astype(array.dtype)
-        elif name != "light":
-            array[...] += 17
-    state.speed[hidden] += 3.0
-    far = np.hypot(state.x - state.x[view.ego], state.y - state.y[view.ego]) > RANGE_M
-    hidden &= far | (state.half_width < THIN_M)  # others may hide somebody else
-    state.yaw[hidden] += 1.0
-    state.indicator[hidden] = 1
-    state.brake_light[hidden] = 1 - state.brake_light[hidden]
-    state.kind[hidden & (random.random(hidden.size) < 0.3)] = ActorKind.ABSENT
-    return dataclasses.replace(view, state=state)
 
 
 @pytest.mark.parametrize(

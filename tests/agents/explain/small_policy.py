@@ -11,28 +11,30 @@ import di_envs
 from agents import load_agent
 from agents.driveinsight.config import (
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     PlannerConfig,
     PolicyConfig,
 )
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
+from agents.networks.grid import GridConfig
+from tests.agents.driveinsight.random_inputs import awake
 
 CONFIG = PolicyConfig(
     name="test",
     grid=GridConfig(cells=24),
     camera=CameraEncoderConfig(rig="rl", width=4, stride=4, channels=4, depth_bins=4),
     lidar=None,
-    planner=PlannerConfig(width=16, heads=2, layers=3, bev_tokens=4),
+    planner=PlannerConfig(width=16, heads=2, layers=3),
     memory_frames=2,
-    bev_width=4,
+    fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
 )
 
 
 def save_policy(folder: Path, seed: int = 3, config: PolicyConfig = CONFIG) -> Path:
     """Writes an untrained policy."""
     torch.manual_seed(seed)
-    save_pretrained(Policy(config), folder, "a card")
+    save_pretrained(awake(Policy(config)), folder, "a card")
     return folder
 
 

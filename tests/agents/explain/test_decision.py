@@ -59,7 +59,7 @@ def test_one_look_sees_what_two_do(agent, moment):
 def test_a_component_is_as_long_as_all_its_tokens_gradients_together(agent, moment):
     response = responses_at(agent, *moment)
     tokens = token_gradients(agent.explainable(), *moment)
-    assert tokens["bev"].shape == (2, 16, 16)  # 4 x 4 tokens of width 16
+    assert tokens["bev"].shape == (2, 3, 16)  # objects, signals and features, of width 16
     for name, (x, y) in zip(response.groups, response.gradient, strict=True):
         assert np.isclose(np.sqrt((tokens[name][0] ** 2).sum()), x)
         assert np.isclose(np.sqrt((tokens[name][1] ** 2).sum()), y)

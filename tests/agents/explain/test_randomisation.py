@@ -24,7 +24,7 @@ def test_maps_change_as_weights_are_shuffled_and_the_weights_come_back(tmp_path)
     before = {name: value.clone() for name, value in agent.policy.state_dict().items()}
     found = randomisation_check(agent, *moment)
     assert [each.parts[-1] for each in found][:2] == ["planner", "prompt"]
-    assert found[-1].parts[-1] == "camera"
+    assert found[-1].parts[-1] == "perception"
     assert abs(found[-1].maps["bev"]) < 0.7
     assert all(each.waypoints_m > 0.0 for each in found)
     after = agent.policy.state_dict()

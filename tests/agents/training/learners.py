@@ -1,4 +1,4 @@
-"""A learner for the expert to correct: one that never moves."""
+"""Learners for the expert to correct: one that never moves, and one that soon gives up."""
 
 from __future__ import annotations
 
@@ -18,3 +18,10 @@ class Idle:
 
     def close(self):
         pass
+
+
+class Timid(Idle):
+    """Drives off, and leaves the road."""
+
+    def act(self, observation, memory):
+        return make_control(0.5, 0.02, 0.0), memory

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from torch import Tensor
+
 from agents.driveinsight.config import (
     CameraEncoderConfig,
-    GridConfig,
+    FusionConfig,
     LidarEncoderConfig,
     PlannerConfig,
     PolicyConfig,
 )
+from agents.networks.grid import GridConfig
 
-_PLANNER = PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4)
+_PLANNER = PlannerConfig(width=16, heads=2, layers=1)
 
 PROMPT_ONLY = PolicyConfig(
     name="test-prompt-only",
@@ -23,8 +26,13 @@ SEEING = PolicyConfig(
     name="test-seeing",
     grid=GridConfig(cells=24),
     camera=CameraEncoderConfig(rig="rl", width=4, stride=8, channels=4, depth_bins=4),
-    lidar=LidarEncoderConfig(voxel_m=0.8, voxel_z_m=3.5, widths=(4, 4), channels=4),
+    lidar=LidarEncoderConfig(channels=4),
     planner=_PLANNER,
     memory_frames=2,
-    bev_width=4,
+    fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
 )
+
+
+def on_disk(value: Tensor) -> Tensor:
+    """A weight as it comes back from where it was saved: float16 has rounded it."""
+    return value.half().to(value.dtype) if value.is_floating_point() else value

@@ -96,7 +96,7 @@ def test_two_processes_learn_as_one_and_go_on_to_the_same_bits(tmp_path, drives)
 def test_torchrun_trains_and_one_process_writes(tmp_path, drives):
     torchrun = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2"]
     torchrun += ["--master-port", str(free_port())]
-    command = ["train", "--config", "small-prompt-only", "--data", str(drives), "--steps", "2"]
+    command = ["train", "--config", "driveinsight-told", "--data", str(drives), "--steps", "2"]
     command += ["--batch", "4", "--workers", "0", "--check-routes", "0"]
     command += ["--output", str(tmp_path / "run")]
     done = subprocess.run(

@@ -28,7 +28,7 @@ from agents.training.frames import (
     write_drive,
     write_dropped,
 )
-from agents.training.towns import town_files
+from agents.training.towns import town_files, training_plan, training_town
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
 from di_envs.route_env import RouteEnv
@@ -98,11 +98,8 @@ def test_what_is_kept_is_enough_but_for_the_far_away_in_pictures(env, driven):
 
 
 def test_an_ego_set_aside_stands_a_metre_to_the_right_and_turned(drive):
-    from agents.training.towns import load_training_town
-
-    town, plans = load_training_town("small_grid")
-    plan = next(p for p in plans if p.route_id == drive.facts["route_id"])
-    stage = DriveStage(town, plan, drive.capacity)
+    plan = training_plan("small_grid", drive.facts["route_id"])
+    stage = DriveStage(training_town("small_grid"), plan, drive.capacity)
     x, y, yaw = drive.poses()[20]
     stage.set(drive, 20, right_m=1.0, turn_rad=0.1)
     state = stage.view.state
@@ -228,7 +225,7 @@ def other_world(folder, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (other_weights, "agent_version was driveinsight 1, files .*, is driveinsight 1, files"),
+        (other_weights, "agent_version was driveinsight 2, files .*, is driveinsight 2, files"),
         (other_world, f"world_version was {WORLD_VERSION}, is 0"),
     ],
 )
@@ -240,7 +237,7 @@ def test_collecting_goes_on_with_the_same_driver_and_world_only(
     monkeypatch.setattr(module, "_drive", None)  # nothing may be driven
     (tmp_path / "weights.safetensors").write_bytes(b"these")
     job = DriveJob(folder=tmp_path, town="small_grid", number=0, driver=f"driveinsight:{tmp_path}")
-    facts = module._driven_by(job.driver)
+    facts = module._common(job)
     if dropped:
         job.dropped_path.parent.mkdir()
         job.dropped_path.write_text(json.dumps({"why": "infractions", **facts}))

@@ -8,6 +8,7 @@ import math
 import pytest
 import torch
 
+from agents.driveinsight.config import TOKENS
 from agents.driveinsight.losses import losses
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import (
@@ -18,11 +19,11 @@ from agents.driveinsight.weights import (
     weights_digest,
 )
 from agents.training.collect import drive_paths
-from agents.training.config import TrainConfig, TrainingError
+from agents.training.config import HELD_OUT, TrainConfig, TrainingError
 from agents.training.frames import DriveFileError, read_drive
 from agents.training.learning import Training
 from agents.training.loading import Samples, batches, load_moments
-from agents.training.log import HELD_OUT, forget_rows_after, read_rows, write_curve
+from agents.training.log import forget_rows_after, read_rows, write_curve
 from agents.training.loop import (
     CHECKPOINT_FILE,
     CHECKS_FILE,
@@ -34,7 +35,7 @@ from agents.training.loop import (
 from agents.training.predictions import look
 from agents.training.samples import batch_of, hidden_components
 from agents.training.waypoints import expert_waypoints
-from tests.agents.training.small_policies import PROMPT_ONLY, SEEING
+from tests.agents.training.small_policies import PROMPT_ONLY, SEEING, on_disk
 
 SHORT = TrainConfig(steps=6, batch=3, warm_up=2)
 
@@ -110,7 +111,7 @@ def test_the_policy_that_drove_best_is_kept_and_no_check_is_made_twice(tmp_path,
     assert train(training, data, tmp_path, checks=checks, on_step=watch)
     assert asked == [2, 4, 6]
     kept = from_pretrained(tmp_path / POLICY_FOLDER).state_dict()
-    assert all(torch.equal(kept[name], value) for name, value in at_step_4.items())
+    assert all(torch.equal(kept[name], on_disk(value)) for name, value in at_step_4.items())
     train(training, data, tmp_path, checks=checks)
     assert asked == [2, 4, 6]
     assert "| 4 | 30 |" in (tmp_path / POLICY_FOLDER / "README.md").read_text()
@@ -244,7 +245,13 @@ def test_mixed_precision_gives_whole_waypoints_near_the_exact_ones(moments):
 
 def test_components_are_hidden_as_often_as_the_configuration_says():
     hidden = 1.0 - hidden_components(PROMPT_ONLY, 4000, key=3).numpy().mean(axis=0)
-    rates = list(PROMPT_ONLY.planner.dropout.values())
+    config = PROMPT_ONLY.planner
+    (names, rate), *others = config.together.items()
+    assert not others
+    together = [rate * (name in names.split("+")) for name in TOKENS]
+    rates = [
+        1.0 - (1.0 - config.dropout[n]) * (1.0 - t) for n, t in zip(TOKENS, together, strict=True)
+    ]
     assert hidden == pytest.approx(rates, abs=5.0 * math.sqrt(0.25 / 4000))
 
 
@@ -258,7 +265,7 @@ def test_a_policy_with_sensors_begins_with_the_planner_of_one_without(tmp_path):
     assert "planner.query" in taken
     assert not left
     for name, value in policy.state_dict().items():
-        expected = teacher.state_dict()[name] if name in taken else before[name]
+        expected = on_disk(teacher.state_dict()[name]) if name in taken else before[name]
         assert torch.equal(value, expected), name
     assert len(weights_digest(tmp_path)) == 32
 

@@ -5,22 +5,27 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from functools import cache
 
 import numpy as np
 import pytest
 
-from agents.training.towns import TRAINING_TOWNS, load_training_town, town_files
+from agents.training.towns import (
+    TRAINING_TOWNS,
+    block_of,
+    town_files,
+    training_plan,
+    training_plans,
+    training_town,
+)
 from di_envs.numerics.kernels import kernel_cache
+from di_envs.suites import load_suite
 from di_envs.town.lanes import SignalKind
 from di_envs.town.loading import load_town
-
-loaded = cache(load_training_town)  # a second each
 
 
 @pytest.mark.parametrize("name", TRAINING_TOWNS)
 def test_each_town_has_junctions_with_lights_and_signs_routes_and_triggers(name):
-    town, plans = loaded(name)
+    town, plans = training_town(name), training_plans(name)
     kinds = set(town.signals.kind.tolist())
     assert {int(SignalKind.LIGHT), int(SignalKind.STOP)} <= kinds
     assert len(set(town.lanes.junction[town.lanes.junction >= 0].tolist())) >= 4
@@ -32,7 +37,7 @@ def test_each_town_has_junctions_with_lights_and_signs_routes_and_triggers(name)
 def test_no_lane_of_a_training_town_lies_where_one_of_town05_does():
     theirs = load_town("town05").lanes
     for name in TRAINING_TOWNS:
-        ours = loaded(name)[0].lanes
+        ours = training_town(name).lanes
         apart_m = np.linalg.norm(ends_of(ours)[:, None] - ends_of(theirs)[None], axis=2).max(axis=2)
         assert apart_m.min() > 1.0, name
 
@@ -64,3 +69,29 @@ def test_another_process_with_an_empty_cache_makes_the_same_files(tmp_path):
 def test_an_unknown_town_is_suggested():
     with pytest.raises(ValueError, match="did you mean 'suburb'"):
         town_files("suburbs")
+
+
+def test_there_is_no_end_to_routes_and_no_two_drives_share_one():
+    first, second = (training_plans("small_grid", block) for block in (0, 1))
+    assert [plan.route_id for plan in first] == [str(number) for number in range(60)]
+    assert [plan.route_id for plan in second] == [str(number) for number in range(60, 120)]
+    assert block_of(59) == 0
+    assert block_of(60) == 1
+    ends = {plan.points[[0, -1], :2].tobytes() for plan in (*first, *second)}
+    assert len(ends) == len(first) + len(second)
+    assert training_plan("small_grid", "61").points.tobytes() == second[1].points.tobytes()
+
+
+def test_a_drive_in_town05_begins_and_ends_where_no_suites_route_does():
+    theirs = [
+        plan.points[[0, -1], :2]
+        for name in ("town05_tiny", "town05_short", "town05_long")
+        for plan in load_suite(name).plans(load_town("town05"))
+    ]
+    ours = np.array([plan.points[[0, -1], :2] for plan in training_plans("town05")])
+    assert len(ours) > 40
+    apart_m = np.linalg.norm(ours[:, None] - np.array(theirs)[None], axis=3)
+    assert apart_m.min() > 19.0
+    options = town_files("town05").options()
+    assert (options["traffic"], options["walkers"]) == (120, 60)  # as in its suites
+    assert sum(len(plan.scenarios) for plan in training_plans("town05")) > 40

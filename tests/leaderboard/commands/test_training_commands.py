@@ -30,7 +30,7 @@ def data(tmp_path_factory):
 def policy(data, tmp_path_factory):
     """Trained for three steps: it drives like it."""
     folder = tmp_path_factory.mktemp("run")
-    arguments = ["--config", "small-prompt-only", "--data", str(data), "--output", str(folder)]
+    arguments = ["--config", "driveinsight-told", "--data", str(data), "--output", str(folder)]
     arguments += ["--steps", "3", "--batch", "2", "--workers", "0"]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     return folder / "policy"
@@ -42,7 +42,7 @@ def test_collecting_tells_what_there_is_and_what_is_next(data, capsys):
     card = json.loads((data / "card.json").read_text())
     assert f"{card['drives']} drives with {card['moments']} moments" in out
     assert "lanefollow" in out
-    assert f"Next: driveinsight train --config small --data {data}" in out
+    assert f"Next: driveinsight train --config driveinsight --data {data}" in out
 
 
 def test_training_leaves_a_policy_that_drove_its_log_and_its_card(policy):
@@ -57,7 +57,7 @@ def test_training_leaves_a_policy_that_drove_its_log_and_its_card(policy):
 
 def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, capsys):
     before = (policy / "weights.safetensors").read_bytes()
-    arguments = ["--config", "small-prompt-only", "--data", str(data)]
+    arguments = ["--config", "driveinsight-told", "--data", str(data)]
     arguments += ["--output", str(policy.parent), "--steps", "3", "--batch", "2", "--workers", "0"]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     out = capsys.readouterr().out
@@ -67,7 +67,7 @@ def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, ca
 
 
 def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_path, capsys):
-    arguments = ["--config", "small-without-cameras", "--data", str(data), "--output"]
+    arguments = ["--config", "route-only", "--data", str(data), "--output"]
     arguments += [str(tmp_path), "--steps", "1", "--batch", "1", "--workers", "0"]
     arguments += ["--check-routes", "0", "--init-from", str(policy)]
     assert main(["train", *arguments]) == 0
@@ -75,6 +75,17 @@ def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_pa
     assert "Taken from" in out
     assert "prompt (" in out
     assert "planner (" in out
+
+
+def test_a_planner_alone_is_checked_with_lent_eyes_and_the_next_step_says_so(
+    data, tmp_path, capsys
+):
+    arguments = ["--config", "tiny", "--plan-only", "--data", str(data), "--steps", "2"]
+    arguments += ["--batch", "2", "--output", str(tmp_path), "--cache", str(tmp_path / "cache")]
+    assert main(["train", *arguments, "--check-routes", "1", "--check-every", "2"]) == 0
+    assert (tmp_path / "checks.csv").is_file()
+    policy = tmp_path / "policy"
+    assert f"driveinsight evaluate --agent true-sight:{policy}" in capsys.readouterr().out
 
 
 def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy, tmp_path):

@@ -85,13 +85,16 @@ def test_comments_and_a_renamed_module_leave_the_footing_as_it_was(here, tree):
     (tree / "agents" / "constant.py").rename(tree / "agents" / "steady.py")
     table = tree / "agents" / "__init__.py"
     table.write_text(table.read_text().replace("agents.constant:", "agents.steady:"))
-    (tree / "agents/driveinsight/weights/README.md").write_text("another card\n")
+    card = tree / "agents/driveinsight/weights/driveinsight/README.md"
+    card.parent.mkdir(parents=True, exist_ok=True)
+    card.write_text("another card\n")
     assert rests_on(tree) == here
 
 
 def test_weights_and_a_declared_version_are_another_footing(here, tree):
-    weights = tree / "agents/driveinsight/weights/weights.safetensors"
-    weights.write_bytes(weights.read_bytes()[:-1] + b"\0")
+    weights = tree / "agents/driveinsight/weights/driveinsight/weights.safetensors"
+    weights.parent.mkdir(parents=True, exist_ok=True)
+    weights.write_bytes(b"other weights")
     table = tree / "agents" / "__init__.py"
     now, new = AGENTS["expert"].version, AGENTS["expert"].version + 1  # the first in the table
     table.write_text(table.read_text().replace(f"version={now},", f"version={new},", 1))

@@ -24,7 +24,7 @@ BUSY = {"traffic": 8, "walkers": 4}
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
-    save_untrained(folder, "small-prompt-only")
+    save_untrained(folder, "driveinsight-told")
     return folder
 
 
@@ -76,7 +76,7 @@ def test_the_caller_may_drive_elsewhere_between_two_decisions_and_come_back(run)
 
 
 def test_other_weights_are_noticed_at_the_first_other_decision_and_named(run, weights, tmp_path):
-    save_untrained(tmp_path, "small-prompt-only", seed=1)
+    save_untrained(tmp_path, "driveinsight-told", seed=1)
     other = dataclasses.replace(run, agent=f"driveinsight:{tmp_path}")
     with pytest.raises(RetraceError, match=r"at 0(\.1)? s the agent acts otherwise.*the weights"):
         list(retrace(other, run.routes[0]))

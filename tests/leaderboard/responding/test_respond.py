@@ -10,10 +10,16 @@ import pytest
 import torch
 from PIL import Image
 
-from agents.driveinsight.config import CameraEncoderConfig, GridConfig, PlannerConfig, PolicyConfig
+from agents.driveinsight.config import (
+    CameraEncoderConfig,
+    FusionConfig,
+    PlannerConfig,
+    PolicyConfig,
+)
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.explain.responses import responses_at
+from agents.networks.grid import GridConfig
 from di_envs.world.state import EventKind
 from leaderboard.commands.cli import EXIT_USAGE, main
 from leaderboard.records.record import EventRecord
@@ -93,10 +99,10 @@ def test_a_policy_with_sensors_and_a_memory_is_looked_at_as_it_drove_edits_and_a
     config = PolicyConfig(
         name="sensors",
         grid=GridConfig(cells=24),
-        camera=CameraEncoderConfig(rig="rl", width=4, channels=4, depth_bins=4),
+        camera=CameraEncoderConfig(rig="rl", width=4, stride=4, channels=4, depth_bins=4),
         lidar=None,
-        planner=PlannerConfig(width=16, heads=2, layers=1, bev_tokens=4),
-        bev_width=4,
+        planner=PlannerConfig(width=16, heads=2, layers=1),
+        fusion=FusionConfig(width=4, remembered=4, widths=(4, 4)),
     )
     torch.manual_seed(0)
     save_pretrained(Policy(config), tmp_path, "a card")

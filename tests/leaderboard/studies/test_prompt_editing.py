@@ -276,7 +276,7 @@ def test_a_light_that_was_yellow_as_the_ego_drove_over_it_is_a_red_one_that_it_m
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("policy")
-    save_pretrained(Policy(config_named("small-prompt-only")), folder, "untrained")
+    save_pretrained(Policy(config_named("driveinsight-told")), folder, "untrained")
     return folder
 
 

@@ -9,19 +9,25 @@ sums over cells are taken as they come, and only the grid's range decides what c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from agents.driveinsight.config import CameraEncoderConfig, GridConfig
-from di_envs.sensors.camera.config import CameraConfig, Rig
+from agents.networks.grid import GridConfig
+from di_envs.sensors.camera.config import CameraConfig
 
 
-def depths_m(config: CameraEncoderConfig) -> NDArray[np.float64]:
-    """(D,) the distances ahead of a camera that a pixel may lie at."""
-    return np.linspace(config.nearest_m, config.farthest_m, config.depth_bins)
+def growing_depths_m(nearest_m: float, farthest_m: float, bins: int) -> NDArray[np.float64]:
+    """(bins,) distances ahead of a camera that a pixel may lie at, their steps growing evenly.
+
+    What is far is seen less sharply: its depth need not be told apart so finely.
+    """
+    k = np.arange(bins)
+    return nearest_m + (farthest_m - nearest_m) * k * (k + 1) / (bins * (bins - 1))
 
 
 def frustum_points(
@@ -57,15 +63,17 @@ class FrustumPooling(nn.Module):
     sample: Tensor
     start: Tensor
 
-    def __init__(self, rig: Rig, config: CameraEncoderConfig, grid: GridConfig) -> None:
+    def __init__(
+        self,
+        cameras: Sequence[CameraConfig],
+        stride: int,
+        depths: NDArray[np.float64],
+        grid: GridConfig,
+    ) -> None:
         super().__init__()
         self.grid = grid
-        depths = depths_m(config)
         cell = np.concatenate(
-            [
-                cells_of(frustum_points(camera, config.stride, depths), grid).reshape(-1)
-                for camera in rig.cameras
-            ]
+            [cells_of(frustum_points(each, stride, depths), grid).reshape(-1) for each in cameras]
         )  # (N*H*W*D,)
         self.pixels = cell.size // depths.size
         order = np.argsort(cell, kind="stable")

@@ -70,7 +70,7 @@ class ResNet(nn.Module):
     """The backbone without its classifier.
 
     Attributes:
-        channels: Of the four feature maps that `forward` returns.
+        channels: Of the feature maps that `forward` returns.
     """
 
     def __init__(self, block: str, depths: Sequence[int], width: int) -> None:
@@ -78,7 +78,7 @@ class ResNet(nn.Module):
         kind = BLOCKS[block]
         self.conv1 = nn.Conv2d(3, width, 7, 2, 3, bias=False)
         self.bn1 = nn.BatchNorm2d(width)
-        inputs, self.channels = width, [width * 2**n * kind.expansion for n in range(4)]
+        inputs, self.channels = width, [width * 2**n * kind.expansion for n in range(len(depths))]
         for n, depth in enumerate(depths):
             blocks = []
             for index in range(depth):
@@ -88,10 +88,10 @@ class ResNet(nn.Module):
             setattr(self, f"layer{n + 1}", nn.Sequential(*blocks))
 
     def forward(self, images: Tensor) -> list[Tensor]:
-        """(B, 3, H, W) to feature maps at strides 4, 8, 16 and 32."""
+        """(B, 3, H, W) to feature maps at strides 4, 8, 16 …, one for each layer."""
         x = F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
         maps = []
-        for n in range(1, 5):
+        for n in range(1, len(self.channels) + 1):
             x = self.get_submodule(f"layer{n}")(x)
             maps.append(x)
         return maps
