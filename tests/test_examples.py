@@ -98,7 +98,7 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
 
 def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     pytest.importorskip("torch", reason="needs the extra policy")
-    recipe, small = tmp_path / "tiny.toml", {"steps": "2", "batch": "2", "frames": "20"}
+    recipe, small = tmp_path / "tiny.toml", {"steps": "2", "frames": "20"}
     text = (EXAMPLES.parent / "recipes" / "tiny.toml").read_text(encoding="utf-8")
     for name, value in small.items():
         text = re.sub(rf"^{name} = .*$", f"{name} = {value}", text, flags=re.MULTILINE)

@@ -18,6 +18,7 @@ from agents.networks.grid import GridConfig
 from di_envs.world.kinds import ActorKind
 
 IGNORED = 255  # class of a cell that nothing is asked of
+OTHERS = 10.0  # added to the state of a lamp that does not govern the ego's lane
 _CLASS_WEIGHTS = (0.5, 0.5, 1.0, 2.0, 1.5, 4.0)  # in the order of `BevClass`: the rare weigh more
 _SPREAD = 0.35  # of an object's sides, the standard deviation of its peak …
 _LEAST_SPREAD_M, _MOST_SPREAD_M = 0.6, 1.6  # … within these
@@ -49,8 +50,9 @@ class PerceptionTargets:
         objects: (B, M, 9) rows of `truth`; zeros for nobody, and 0 in the last column for those
             who are hidden.
         signal: (B, 8) the governing signal; zeros for none.
-        lamps: (B, K, 3) where in the image that sees lamps best the governing ones are: row and
-            column [its pixels / 4], and state 0 to 3; -1 for none. None without cameras.
+        lamps: (B, K, 3) where in the image that sees lamps best they are: row and column [its
+            pixels / 4], and state 0 to 3, of those that do not govern `OTHERS` more; -1 for none.
+            None without cameras.
         depth: For each size of image (B, N, h, w) index of the depth bin, -1 for none.
     """
 
@@ -78,8 +80,9 @@ def perception_losses(
         **_signal_terms(heads, targets.signal, grid),
     }
     if heads.lamps is not None and targets.lamps is not None:
-        wanted = lamp_heat(targets.lamps, heads.lamps.shape[-2:])
-        terms["lamps"] = focal(heads.lamps, wanted, torch.zeros_like(wanted))
+        wanted, ignored = lamp_heat(targets.lamps, heads.lamps.shape[-2:])
+        # few are shown at once: by their number alone a batch that has one would weigh too much
+        terms["lamps"] = focal(heads.lamps, wanted, ignored, least=0.5 * len(wanted))
     if depth and weights.depth:
         terms["depth"] = torch.stack(
             [
@@ -93,8 +96,8 @@ def perception_losses(
     return {**weighted, "total": torch.stack(list(weighted.values())).sum()}
 
 
-def focal(logits: Tensor, wanted: Tensor, ignored: Tensor) -> Tensor:
-    """The focal loss of heatmaps, over the number of peaks.
+def focal(logits: Tensor, wanted: Tensor, ignored: Tensor, *, least: float = 1.0) -> Tensor:
+    """The focal loss of heatmaps, over the number of peaks, or `least` where there are fewer.
 
     Args:
         logits: (B, C, H, W).
@@ -106,7 +109,7 @@ def focal(logits: Tensor, wanted: Tensor, ignored: Tensor) -> Tensor:
     peak = wanted == 1.0
     hit = (1.0 - score) ** 2 * F.logsigmoid(logits)
     miss = (1.0 - wanted) ** 4 * (1.0 - ignored) * score**2 * F.logsigmoid(-logits)
-    return -torch.where(peak, hit, miss).sum() / peak.sum().clamp(min=1.0)
+    return -torch.where(peak, hit, miss).sum() / peak.sum().clamp(min=least)
 
 
 def object_classes(kinds: Tensor) -> Tensor:
@@ -216,14 +219,24 @@ def _signal_terms(heads: Heads, signal: Tensor, grid: GridConfig) -> dict[str, T
     return terms
 
 
-def lamp_heat(lamps: Tensor, size: torch.Size) -> Tensor:
-    """(B, 4, H, W) what the map of lamps should show, from (B, K, 3) places and states."""
+def lamp_heat(lamps: Tensor, size: torch.Size) -> tuple[Tensor, Tensor]:
+    """What the map of lamps should show, and where nothing is asked of it.
+
+    Args:
+        lamps: (B, K, 3) places and states.
+        size: H, W of the map.
+
+    Returns:
+        (B, 4, H, W) each: 1 at lamps that govern; and 1 at others, whatever they show.
+    """
     height, width = size
     rows = torch.arange(height, device=lamps.device, dtype=torch.float32)
     columns = torch.arange(width, device=lamps.device, dtype=torch.float32)
     along = (-((rows - lamps[..., 0, None].floor()) ** 2) / 0.5).exp()  # (B, K, H)
     across = (-((columns - lamps[..., 1, None].floor()) ** 2) / 0.5).exp()
     maps = along[..., :, None] * across[..., None, :]  # (B, K, H, W)
-    return torch.stack(
+    wanted = torch.stack(
         [(maps * (lamps[..., 2] == n)[..., None, None]).amax(dim=1) for n in range(4)], dim=1
     )
+    others = (maps * (lamps[..., 2] >= OTHERS)[..., None, None]).amax(dim=1)
+    return wanted, others[:, None].expand_as(wanted)

@@ -13,6 +13,7 @@ import time
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -359,10 +360,27 @@ def perceive(
     sequences = Sequences(policy.config, config, chosen)
     numbers = _order(config, training.step)
     batches = rendered(sequences, config.batch, numbers, joined, workers=workers)
+    with closing(batches):
+        _learn(training, batches, folder, tell, stop)
+    training.save(checkpoint)
+    if training.step < config.steps:
+        return False
+    card = f"Eyes of '{policy.config.name}' after {training.step} steps; no driver yet.\n"
+    save_pretrained(policy, folder / POLICY_FOLDER, card)
+    return True
+
+
+def _learn(
+    training: Perceiving,
+    batches: Iterator[Moments],
+    folder: Path,
+    tell: Callable[[int, Mapping[str, float]], None],
+    stop: Callable[[], bool],
+) -> None:
+    """Steps until the last one, or until it is asked to stop; writes the log and checkpoints."""
+    config = training.config
     saved_s, sums, count = time.monotonic(), Counter[str](), 0
-    while training.step < config.steps:
-        if stop():
-            break
+    while training.step < config.steps and not stop():
         terms = training.update(next(batches))
         tell(training.step, terms)
         sums.update(terms)
@@ -376,14 +394,8 @@ def perceive(
         sums, count = Counter[str](), 0
         # together with a row, so that rows are the same however often a run is cut
         if time.monotonic() - saved_s > CHECKPOINT_EVERY_S:
-            training.save(checkpoint)
+            training.save(folder / CHECKPOINT_FILE)
             saved_s = time.monotonic()
-    batches.close()
-    training.save(checkpoint)
-    if training.step == config.steps:
-        card = f"Eyes of '{policy.config.name}' after {training.step} steps; no driver yet.\n"
-        save_pretrained(policy, folder / POLICY_FOLDER, card)
-    return training.step == config.steps
 
 
 def moments_of(values: Any, chosen: Tensor) -> Any:

@@ -22,7 +22,7 @@ from agents.driveinsight.perception_losses import PerceptionTargets
 from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
-from agents.training.truth import governing_lamps, hidden_cells, seen_truth
+from agents.training.truth import hidden_cells, seen_truth, shown_lamps
 from agents.training.variation import Variation, drawn
 from di_envs.observer import Observer
 from di_envs.sensors.camera.config import CameraConfig, Rig, rig_of
@@ -120,7 +120,7 @@ class SequenceRenderer:
         lamps = None
         if self._rig is not None:
             camera = sharpest(self._rig)
-            lamps = torch.from_numpy(governing_lamps(view, camera, LAMP_STRIDE))[None]
+            lamps = torch.from_numpy(shown_lamps(view, camera, LAMP_STRIDE))[None]
         state = view.state
         pose = np.array([state.x[0] - origin[0], state.y[0] - origin[1], state.yaw[0]], np.float32)
         signal = signals[:1] if len(signals) else np.zeros((1, SIGNAL_COLUMNS), np.float32)

@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.driveinsight.perception_losses import IGNORED
+from agents.driveinsight.heads import CLASS_OF_KIND, KIND_OF_CLASS
+from agents.driveinsight.perception_losses import IGNORED, OTHERS
 from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.expert.occlusion import Buildings, buildings_of, collect_hiders, is_hidden
 from agents.networks.grid import GridConfig
@@ -30,14 +31,22 @@ from di_envs.town.queries import nearest_driving_lane_towards, pose_at
 from di_envs.world.state import ActorKind, State
 from di_envs.world.world import WorldView
 
-LAMPS = 4  # of one signal that are told: its heads are two
+LAMPS = 8  # that are told: the heads of one signal are two
+LAMPS_M, TOWARDS = (
+    100.0,
+    0.4,
+)  # within which others are; cosine of the angle that they are turned away
 SIGN_M = 2.3  # above its pole's foot hangs a stop sign
 SIGNAL_AHEAD_M = 50.0  # along the lane, up to which a stop line governs the car
 ON_LANE_M = 3.0  # from a lane's middle, within which the car is on it
 
+# By `ActorKind`: which of the kinds that eyes tell apart it looks like
+_KIND_SEEN = np.array(
+    [int(KIND_OF_CLASS[CLASS_OF_KIND[k]]) if k in CLASS_OF_KIND else int(k) for k in ActorKind]
+)
 _ABSENT, _PROP = int(ActorKind.ABSENT), int(ActorKind.PROP)
 _LIGHT, _STOP = int(SignalKind.LIGHT), int(SignalKind.STOP)
-_STATE_OF_LIGHT = {LightState.RED: 0, LightState.YELLOW: 1, LightState.GREEN: 2}
+_STATE_OF_LIGHT = np.array([-1, 2, 1, 0])  # by `LightState`
 _STOP_STATE = 3
 _RED, _YELLOW, _GREEN = int(LightState.RED), int(LightState.YELLOW), int(LightState.GREEN)
 
@@ -52,13 +61,15 @@ def seen_truth(
         grid: Of the ego; whose middle lies outside it is left out, as is who is on another level.
 
     Returns:
-        Objects (N, 9), in the order of actors, the last column 1 for those in sight and 0 for those
-        hidden behind others or buildings; and signals (M, 8), M being 0 or 1.
+        Objects (N, 9), in the order of actors, of kinds that eyes tell apart (car, bicycle,
+        walker), the last column 1 for those in sight and 0 for those hidden behind others or
+        buildings; and signals (M, 8), M being 0 or 1.
     """
     state, town = view.state, view.town
     sides = np.array([grid.x_min_m, grid.x_max_m, grid.y_min_m, grid.y_max_m])
     objects = np.zeros((state.kind.size, OBJECT_COLUMNS), np.float32)
     count = _fill_objects(state, buildings_of(town), sides, objects)
+    objects[:count, 7] = _KIND_SEEN[objects[:count, 7].astype(np.int64)]
     signals = np.zeros((1, SIGNAL_COLUMNS), np.float32)
     line = governing_line(state, town.lanes, town.signals)
     if line >= 0:
@@ -155,8 +166,11 @@ def _fill_signal(state: State, signals: Signals, line: int, out: Float32) -> Non
     out[7] = 1.0
 
 
-def governing_lamps(view: WorldView, camera: CameraConfig, stride: int) -> NDArray[np.float32]:
-    """Where a camera shows the lit lamps, or the stop sign, that govern the ego's lane.
+def shown_lamps(view: WorldView, camera: CameraConfig, stride: int) -> NDArray[np.float32]:
+    """Where a camera shows lit lamps and stop signs: those of the ego's lane, then others.
+
+    Others may be those that governed it until now, or will: nothing tells them apart by their looks
+    alone, so nobody is to be blamed for seeing them.
 
     Args:
         view: Of the world.
@@ -164,27 +178,29 @@ def governing_lamps(view: WorldView, camera: CameraConfig, stride: int) -> NDArr
         stride: Pixels of the image to one of the map that they are wanted in.
 
     Returns:
-        (LAMPS, 3) row and column in that map, and the state: 0 red, 1 yellow, 2 green, 3 stop sign;
-        -1 for none.
+        (LAMPS, 3) row and column in that map, and the state: 0 red, 1 yellow, 2 green, 3 stop sign,
+        `OTHERS` more for those that do not govern the lane; -1 for none.
     """
     out = np.full((LAMPS, 3), -1.0, np.float32)
     state, signals = view.state, view.town.signals
     line = governing_line(state, view.town.lanes, signals)
-    if line < 0:
-        return out
-    signal = signals.stop_signal[line]
-    if signals.kind[signal] == SignalKind.STOP:
-        places, shown = signals.pose[signal][None, :3] + (0.0, 0.0, SIGN_M), _STOP_STATE
-    else:
-        lamps, light = scene_of(view.town).lamps, LightState(int(state.light[signal]))
-        lit = (lamps.signal == signal) & (lamps.state == light)
-        places, shown = lamps.pose[lit, :3], _STATE_OF_LIGHT.get(light, -1)
-    seen = camera.project(_as_seen(state, places))
+    governing = signals.stop_signal[line] if line >= 0 else -1
+    lamps = scene_of(view.town).lamps
+    lit = lamps.state == state.light[lamps.signal]
+    signs = np.flatnonzero(signals.kind == SignalKind.STOP)
+    place = np.concatenate([lamps.pose[lit], signals.pose[signs] + (0.0, 0.0, SIGN_M, 0.0)])
+    signal = np.concatenate([lamps.signal[lit], signs])
+    shown = np.concatenate([_STATE_OF_LIGHT[lamps.state[lit]], np.full(len(signs), _STOP_STATE)])
+    away = np.hypot(place[:, 0] - state.x[0], place[:, 1] - state.y[0])
+    towards = np.cos(place[:, 3] - state.yaw[0]) > TOWARDS
+    seen = camera.project(_as_seen(state, place[:, :3]))
     size = np.array([camera.width, camera.height])
     inside = (seen[:, 2] > 0.0) & ((seen[:, :2] >= 0.0) & (seen[:, :2] < size)).all(axis=1)
-    found = seen[inside][:LAMPS]
-    out[: len(found), :2] = found[:, 1::-1] / stride
-    out[: len(found), 2] = shown
+    chosen = np.flatnonzero(inside & towards & (away < LAMPS_M))
+    order = np.lexsort((away[chosen], signal[chosen] != governing))
+    chosen = chosen[order][:LAMPS]
+    out[: len(chosen), :2] = seen[chosen, 1::-1] / stride
+    out[: len(chosen), 2] = shown[chosen] + OTHERS * (signal[chosen] != governing)
     return out
 
 

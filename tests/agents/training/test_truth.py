@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from agents.driveinsight.perception_losses import OTHERS
 from agents.networks.grid import GridConfig
-from agents.training.truth import SIGNAL_AHEAD_M, seen_truth
+from agents.training.truth import SIGNAL_AHEAD_M, seen_truth, shown_lamps
+from di_envs.sensors.camera.config import rig_of
 from di_envs.town.lanes import LightState
 from di_envs.world.state import ActorKind
 from di_envs.world.world import WorldView
 from tests.hand_made import Scene, toy_plan, toy_town
 
 GRID = GridConfig(x_min_m=-16.0, x_max_m=60.8, y_min_m=-38.4, y_max_m=38.4, cells=96)
+NARROW = rig_of("driveinsight").cameras[-1]
 LANE_Y = -44.75  # of an eastward lane to the stop line of head 0 at x = -15
 
 
@@ -29,11 +32,14 @@ def scene(town):
     return scene
 
 
-def truth(scene):
-    view = WorldView(
+def view_of(scene):
+    return WorldView(
         town=scene.town, state=scene.state, plans=(scene.plan,), capacity=scene.capacity
     )
-    return seen_truth(view, GRID)
+
+
+def truth(scene):
+    return seen_truth(view_of(scene), GRID)
 
 
 def put(scene, actor, ahead, right, *, height=1.5, **other):
@@ -50,6 +56,14 @@ def test_a_bicycle_is_told_by_place_heading_size_and_velocity_over_the_ground(sc
     # 4 m by 2 m, turned to the right: it moves to the right at 4 m/s
     expected = [20.0, -3.0, np.pi / 2, 4.0, 2.0, 0.0, 4.0, ActorKind.BICYCLE, 1.0]
     assert objects.tolist() == [pytest.approx(expected, abs=1e-5)]
+
+
+def test_kinds_are_told_apart_as_eyes_can(scene):
+    put(scene, 1, 10.0, -4.0, kind=ActorKind.BUS)
+    put(scene, 2, 10.0, 4.0, kind=ActorKind.MOTORCYCLE)
+    put(scene, 3, 20.0, 4.0, kind=ActorKind.WALKER)
+    kinds = [ActorKind.CAR, ActorKind.BICYCLE, ActorKind.WALKER]
+    assert truth(scene)[0][:, 7].tolist() == kinds
 
 
 @pytest.mark.parametrize(
@@ -114,3 +128,28 @@ def test_nothing_governs_behind_the_line_or_off_the_lanes(scene):
 def test_who_drives_against_his_lane_is_governed_by_nothing(scene):
     scene.put(0, -35.0, LANE_Y, yaw=np.pi)
     assert len(truth(scene)[1]) == 0
+
+
+@pytest.mark.parametrize("shown", [LightState.RED, LightState.GREEN])
+def test_the_lit_lamp_of_the_lanes_light_is_where_the_camera_has_it(scene, shown):
+    scene.put(0, -45.0, LANE_Y)
+    scene.state.light[:] = LightState.YELLOW
+    scene.state.light[0] = shown
+    lamps = shown_lamps(view_of(scene), NARROW, 4)
+    governing = lamps[(lamps[:, 2] >= 0.0) & (lamps[:, 2] < 4.0)]
+    assert set(governing[:, 2]) == {0.0 if shown == LightState.RED else 2.0}
+    assert len(governing) == 2  # beside the line, and beyond the junction
+    # red hangs 0.84 m above green: so many pixels, at 32 m and at 68 m from the camera at the most
+    rows = {}
+    for light in (LightState.RED, LightState.GREEN):
+        scene.state.light[0] = light
+        rows[light] = shown_lamps(view_of(scene), NARROW, 4)[:2, 0]
+    apart = 4.0 * (rows[LightState.GREEN] - rows[LightState.RED])
+    assert ((NARROW.focal_px * 0.84 / 70.0 < apart) & (apart < NARROW.focal_px * 0.84 / 28.0)).all()
+
+
+def test_lamps_of_a_light_that_was_passed_are_told_as_others(scene):
+    scene.put(0, -14.0, LANE_Y)
+    scene.state.light[:] = LightState.RED
+    shown = shown_lamps(view_of(scene), NARROW, 4)[:, 2]
+    assert set(shown[shown >= 0.0]) == {OTHERS}
