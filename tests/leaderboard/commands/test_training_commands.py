@@ -100,7 +100,7 @@ def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["train", "--config", "smal"], "did you mean 'small'"),
+        (["train", "--config", "tinny"], "did you mean 'tiny'"),
         (["train", "--data", "nowhere", "--config", "tiny"], "run `driveinsight collect` first"),
         (["train", "--init-from", "nowhere"], "give a folder that save_pretrained wrote"),
         (["train", "--steps", "0"], "steps must be at least 1"),
