@@ -185,19 +185,13 @@ def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
 
 def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -> RunRecord:
     """A run of which nothing is driven yet."""
-    requires = scene.requires
+    asked = scene.requires.as_json()
     return RunRecord(
         rules=spec.rules,
         agent=spec.agent,
         agent_version=scene.agent_version,
-        track=str(requires.track),
-        requires={
-            "observations": list(requires.observations),
-            "control_dt_s": requires.control_dt_s,
-            "privileged": requires.privileged,
-            "hd_map": requires.hd_map,
-            "options": _as_json(requires.options),
-        },
+        track=str(scene.requires.track),
+        requires={name: value for name, value in asked.items() if name != "branchable"},
         suite=suite.name,
         suite_version=suite.version,
         options={name: _as_json(value) for name, value in spec.options.items()},
