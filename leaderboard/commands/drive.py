@@ -49,7 +49,11 @@ class Drive(SceneArguments):
         from leaderboard.running.video import VideoError, check_video
 
         spec = RunSpec(
-            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+            agent=self.agent,
+            options=options,
+            rules=self.rules,
+            interventions=self.edits(),
+            isolate=not self.no_isolate,
         )
         try:
             if self.video is not None:

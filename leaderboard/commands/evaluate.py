@@ -68,7 +68,11 @@ class Evaluate(EngineArguments, SceneArguments):
         from leaderboard.running.runner import evaluate
 
         spec = RunSpec(
-            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+            agent=self.agent,
+            options=options,
+            rules=self.rules,
+            interventions=self.edits(),
+            isolate=not self.no_isolate,
         )
         try:
             run = evaluate(

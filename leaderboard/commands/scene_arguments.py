@@ -65,6 +65,10 @@ class SceneArguments:
     intervene: Annotated[str, says("EDITS", "none")] = ""
     """Edits of what the agent sees, joined by `;`, such as "drop:routing; set:speed=0@t>5"."""
 
+    no_isolate: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Drive an agent that is not ours in the world's own process. It can reach the true world
+    there, and the results say so."""
+
     def edits(self) -> tuple[ObservationEdit, ...]:
         """What is edited of what the agent sees.
 

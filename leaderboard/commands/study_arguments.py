@@ -109,6 +109,7 @@ def _drive(arguments: StudyArguments, question: StudyQuestion) -> int:
         options=options,
         rules=arguments.rules,
         interventions=arguments.edits(),
+        isolate=not arguments.no_isolate,
     )
     engine = arguments.make_engine()
     with arguments.connected():

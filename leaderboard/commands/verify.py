@@ -82,6 +82,8 @@ class Verify:
 
 def verdict_lines(verdict: Verdict, run: RunRecord, *, seen: bool) -> list[str]:
     """What was found, in lines to print: the verdict last."""
+    from leaderboard.records.claim_text import claim_lines
+
     lines = [f"results: {problem}" for problem in verdict.problems]
     for route in verdict.routes:
         name = f"route {route.record.route_id}, seed {route.record.seed}"
@@ -92,6 +94,7 @@ def verdict_lines(verdict: Verdict, run: RunRecord, *, seen: bool) -> list[str]:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
     if verdict.differences:
         lines.append(f"Here is {'; '.join(verdict.differences)}: bits may differ for that alone.")
+    lines += claim_lines(run)
     if not run.scored:
         return [*lines, "There is no claim: no route was driven."]
     return [*lines, _conclusion(verdict, run, seen=seen)]

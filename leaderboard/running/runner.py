@@ -18,11 +18,13 @@ from typing import Any
 
 from rich.console import Console
 
+from di_envs.suite_files import from_anywhere
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import add_route, prepare_folder, start_run
 from leaderboard.records.resuming import resumed
+from leaderboard.running.agent_place import drives_apart
 from leaderboard.running.displays.run import RunDisplay
 from leaderboard.running.interruption import interruptible
 from leaderboard.running.jobs import Job, RunSpec, plan_jobs
@@ -194,7 +196,7 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -
         requires={name: value for name, value in asked.items() if name != "branchable"},
         suite=suite.name,
         suite_version=suite.version,
-        options={name: _as_json(value) for name, value in spec.options.items()},
+        options={name: _as_json(value) for name, value in from_anywhere(spec.options).items()},
         town=scene.town,
         town_hash=scene.town_hash,
         routes_hash=scene.routes_hash,
@@ -203,6 +205,8 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -
         cpu=scene.cpu,
         planned=len(jobs),
         interventions=tuple(map(str, spec.interventions)),
+        world=scene.world,
+        isolated=drives_apart(spec, scene.requires),
         refused=dict(scene.refused),
         notes=scene.notes,
     )

@@ -10,6 +10,7 @@ from agents.base import Agent, Requirements
 from agents.faults import agents_code, describe
 from agents.versions import agent_version
 from di_envs.numerics.kernels import cpu_capability
+from di_envs.suite_files import content_of, suite_of
 from leaderboard.records.versions import package_versions
 from leaderboard.running.agent_place import AgentPlace
 from leaderboard.running.driver import Driver
@@ -97,6 +98,7 @@ def run_facts(driver: Driver) -> RunFacts:
         routes_hash=routes.hexdigest(),
         versions=package_versions(driver.spec.agent),
         cpu=cpu_capability(),
+        world=content_of(suite_of(driver.spec.options)),
         refused=planned.refused,
         notes=(*planned.warnings, *planned.notes),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import textwrap
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
