@@ -95,7 +95,7 @@ class Requirements:
         Raises:
             ValueError: If they are no requirements, or ask for what they may not.
         """
-        read = from_json(cls, values, "requires")
+        read = from_json(cls, values, "requires", complete=True)
         return dataclasses.replace(read, options=sensors_of_json(read.options))
 
     @property

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base import SENSOR_OPTIONS, sensors_of_json
+from agents.base import SENSOR_OPTIONS, Requirements, sensors_of_json
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
 from di_envs.world.state import TICK_S
@@ -76,7 +76,7 @@ def replay_env(
     """
     seen_only = ("observations", *SENSOR_OPTIONS)  # all that an agent may have asked for
     kept = {name: value for name, value in run.options.items() if name not in seen_only}
-    kept["control_dt_s"] = run.options.get("control_dt_s", run.requires["control_dt_s"])
+    kept["control_dt_s"] = run.options.get("control_dt_s", required(run).control_dt_s)
     try:
         env = RouteEnv(**{**kept, "observations": observations, **options})
     except (ValueError, OSError) as error:
@@ -89,17 +89,32 @@ def replay_env(
     return env
 
 
+def required(run: RunRecord) -> Requirements:
+    """What a run's agent required, of what an agent may ask for.
+
+    Raises:
+        ReplayError: If the record says of it what this program does not know.
+    """
+    said = {"branchable": True, **run.requires}  # records do not say that
+    options = said.get("options")
+    if isinstance(options, Mapping):
+        said["options"] = {name: options[name] for name in SENSOR_OPTIONS if name in options}
+    try:
+        return Requirements.of_json(said)
+    except ValueError as error:
+        raise ReplayError(f"the record's {error}") from error
+
+
 def sensor_options(run: RunRecord) -> dict[str, Any]:
     """Arguments for `replay_env` that make it show what the agent saw, bit for bit.
 
     Raises:
         ReplayError: If the record says of a sensor what this program does not know.
     """
-    given: Mapping[str, Any] = {**run.requires.get("options", {}), **run.options}
-    options: dict[str, Any] = {"observations": tuple(run.requires["observations"])}
+    asked = required(run)
     try:
-        sensors = {name: given[name] for name in SENSOR_OPTIONS if name in given}
-        return {**options, **sensors_of_json(sensors)}
+        own = {name: run.options[name] for name in SENSOR_OPTIONS if name in run.options}
+        return {"observations": asked.observations, **asked.options, **sensors_of_json(own)}
     except ValueError as error:
         raise ReplayError(f"the record's sensors cannot be made here: {error}") from error
 

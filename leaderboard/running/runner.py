@@ -38,6 +38,7 @@ from leaderboard.running.messages import (
     Started,
     Warned,
 )
+from leaderboard.running.terminal import Terminal
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
 
 
@@ -80,7 +81,7 @@ def evaluate(
         ResultsError: If the folder cannot be written to, is in use, holds results that are not
             to be replaced, or results that this run cannot continue.
     """
-    console = console or Console(stderr=True)
+    console = console or Terminal(stderr=True)
     with folder_lock(folder), interruptible() as interruption:
         prepare_folder(
             folder,

@@ -28,6 +28,7 @@ from leaderboard.running.interventions import texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
 from leaderboard.running.messages import RunFacts
 from leaderboard.running.runner import Existing, evaluate, new_run
+from leaderboard.running.terminal import Terminal
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
 from leaderboard.studies import StudyError
 from leaderboard.studies.looking_ahead import look_ahead
@@ -89,7 +90,7 @@ def drive_study(
         SetupError: If the agent or an option is wrong.
         ResultsError: If the folder cannot be written to, or is in use.
     """
-    console = console or Console(stderr=True)
+    console = console or Terminal(stderr=True)
     with folder_lock(folder), interruptible() as interruption:
         earlier = _earlier(folder)
         with compile_progress(console):
