@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
-from agents import AGENTS, SCHEMES, place_and_options
+from agents import AGENTS, SCHEMES
 
 # Of the schemes, the one whose files are numbers and text: a policy of ours
 _DATA_ONLY = "driveinsight"
@@ -22,9 +22,9 @@ def code_of_others(spec: str) -> str:
     if spec in _OURS or not place or scheme == _DATA_ONLY:
         return ""
     if scheme == "sb3":
-        return f"the pickles in {_file_of(spec, place)}"
+        return f"the pickles in {_file_of(place)}"
     if scheme in SCHEMES:
-        return f"the file {_file_of(spec, place)}"
+        return f"the file {_file_of(place)}"
     return code_at(spec.rpartition(":")[0])
 
 
@@ -44,5 +44,5 @@ def code_at(place: str) -> str:
     return f"the module {place}{where}"
 
 
-def _file_of(spec: str, place: str) -> Path:
-    return Path(place_and_options(spec, place)[0]).absolute()
+def _file_of(place: str) -> Path:
+    return Path(place.partition("?")[0]).absolute()
