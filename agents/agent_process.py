@@ -27,7 +27,7 @@ from di_envs.sensors.carla_suite import SensorSuiteError
 
 # How a fault is called in an answer
 CRASHED, REFUSED, NO_EDIT, BAD_SENSORS = "crashed", "refused", "edit", "sensors"
-_MOST_WARNINGS = 20  # in one answer
+MOST_WARNINGS = 20  # in one answer
 
 
 def serve(connection: Connection, place: int | None, where_signal: int) -> None:
@@ -42,7 +42,7 @@ def serve(connection: Connection, place: int | None, where_signal: int) -> None:
     end_with_parent()
     live_for_parent()
     faulthandler.enable()
-    if place is not None:
+    if place is not None and where_signal:
         faulthandler.register(where_signal, file=place, all_threads=False)
     met: list[str] = []
     warnings.simplefilter("default", UserWarning)
@@ -53,7 +53,7 @@ def serve(connection: Connection, place: int | None, where_signal: int) -> None:
             while True:
                 command, *given = connection.recv()
                 answer = _answer(partial(getattr(hosted, command), *given))
-                answer["warned"] = met[:_MOST_WARNINGS]
+                answer["warned"] = met[:MOST_WARNINGS]
                 met.clear()
                 connection.send_bytes(json.dumps(answer).encode())
         except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -8,29 +8,31 @@ In the process of the world a few lines of Python reach the true world, whatever
 from __future__ import annotations
 
 import contextlib
+import multiprocessing.reduction
 import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from multiprocessing.reduction import DupFd
 from typing import Any
 
 import numpy as np
 
 from agents import AgentSpecError
-from agents.agent_process import BAD_SENSORS, NO_EDIT, REFUSED, serve
+from agents.agent_process import BAD_SENSORS, MOST_WARNINGS, NO_EDIT, REFUSED, serve
 from agents.base import Control, Observation, Requirements
 from agents.faults import AgentDiedError, AgentFaultError
 from agents.processes import FRESH, ctrl_c_blocked, how_it_ended
 from agents.shared_arrays import Sender
 from di_envs.edits.text import EditError, EditText
 from di_envs.files.json_values import JsonError, parsed
+from di_envs.files.plain_text import one_plain_line
 from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 
 _LOOK_S = 0.25  # how often it is looked whether the process is still there
 _LONGEST_ANSWER = 2**20  # bytes
+_LONGEST_FAULT = 1000  # characters: an exception's text, and where it was raised
 _RAISED = {REFUSED: AgentSpecError, NO_EDIT: EditError, BAD_SENSORS: SensorSuiteError}
 
 
@@ -85,10 +87,15 @@ class AgentProcess:
             answer = _read(self._connection.recv_bytes(_LONGEST_ANSWER))
         except (EOFError, OSError) as error:
             raise AgentDiedError(f"the agent's process {self._ended()}") from error
-        for text in answer.get("warned", ()):
-            warnings.warn(str(text), stacklevel=3)
+        except BaseException:  # whatever it answers later would be taken for another answer
+            self.stop()
+            raise
+        warned = answer.pop("warned", None)
+        for text in (warned if isinstance(warned, list) else [])[:MOST_WARNINGS]:
+            warnings.warn(one_plain_line(str(text)), stacklevel=3)
         if "fault" in answer:
-            raise _RAISED.get(answer["fault"], AgentFaultError)(str(answer.get("text")))
+            text = one_plain_line(str(answer.get("text")), _LONGEST_FAULT)
+            raise _RAISED.get(str(answer["fault"]), AgentFaultError)(text)
         return answer
 
     def _ended(self) -> str:
@@ -117,7 +124,7 @@ class _OpenFile:
         self._descriptor = descriptor
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _there, (DupFd(self._descriptor),)
+        return _there, (multiprocessing.reduction.DupFd(self._descriptor),)
 
 
 def _there(duplicate: Any) -> int:
@@ -153,9 +160,7 @@ class IsolatedAgent:
     @cached_property
     def requires(self) -> Requirements:
         """What it requires, checked."""
-        answer = self._process.ask("requires")
-        answer.pop("warned", None)
-        return Requirements.of_json(answer)
+        return Requirements.of_json(self._process.ask("requires"))
 
     @property
     def edited(self) -> Any:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import tyro
 
-from di_envs.files.plain_text import file_name
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
@@ -105,6 +104,8 @@ class Branch:
 
     def _new_folder(self) -> Path:
         """`RUN/branch-ROUTE-SECONDS`, or -2 and so on where that is taken."""
+        from di_envs.files.plain_text import file_name
+
         name = f"branch-{file_name(self.route)}-{self.at:g}s"
         folder, number = self.folder / name, 2
         while folder.exists():

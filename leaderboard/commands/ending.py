@@ -10,6 +10,7 @@ EXIT_CRASHED = 1
 EXIT_REFUTED = 1  # a claim does not stand
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
+LONGEST_LINE = 4000  # characters that a complaint may have
 
 
 class UsageError(Exception):
@@ -18,7 +19,9 @@ class UsageError(Exception):
 
 def complain(message: str, kind: str = "[red]error[/red]") -> None:
     """Prints one line on stderr: the kind, then the message."""
-    line = " ".join(message.split())
+    from di_envs.files.plain_text import one_plain_line  # loads more than a list of commands needs
+
+    line = one_plain_line(message, LONGEST_LINE)
     Terminal(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
 
 

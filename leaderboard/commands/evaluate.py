@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from di_envs.files.plain_text import file_name
 from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
@@ -114,6 +113,8 @@ class Evaluate(EngineArguments, SceneArguments):
 
 def plain_name(name: str) -> str:
     """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
+    from di_envs.files.plain_text import file_name
+
     return file_name(name.rpartition(":")[2].replace("/", "_"))
 
 

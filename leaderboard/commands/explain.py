@@ -8,7 +8,6 @@ from typing import Annotated
 
 import tyro
 
-from di_envs.files.plain_text import file_name
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
@@ -70,6 +69,7 @@ class Explain:
     def run(self) -> int:
         """Writes the page; returns the exit code."""
         from di_envs.edits.text import EditError
+        from di_envs.files.plain_text import file_name
         from leaderboard.explaining.questions import read_asked
         from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
         from leaderboard.records.results import ResultsError, read_run, run_folder

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from di_envs.files.plain_text import file_name
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
@@ -142,6 +141,7 @@ class Respond:
 
     def _written(self, target: Path, drives: list[DriveResponses]) -> list[Path]:
         """Figures and tables; the tables are printed too."""
+        from di_envs.files.plain_text import file_name
         from leaderboard.pages.response_figures import write_figures
         from leaderboard.pages.situation_figure import situation_figure
         from leaderboard.responding.moments import marked_moments, moment_name

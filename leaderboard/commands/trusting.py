@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from leaderboard.commands.ending import UsageError
 
@@ -32,11 +31,13 @@ def trusted_run(run: RunRecord, *, agent: str | None, trust: bool) -> RunRecord:
         UsageError: If it would run code of others, and nobody said that it may; names it.
     """
     from agents.ownership import code_of_others
+    from leaderboard.replaying.recorded_edits import code_of_edits
 
     if agent is not None:
         check_model(agent, trust=trust)
     found = [] if agent is not None else [code_of_others(run.agent)]
-    found += _code_of_edits(run)
+    kept = [run.interventions, *(record.interventions for record in run.routes)]
+    found += code_of_edits(text for texts in kept for text in texts)
     code = ", ".join(dict.fromkeys(filter(None, found)))
     if code and not trust:
         raise UsageError(
@@ -54,21 +55,6 @@ def trusted_edits(run: RunRecord, *, trust: bool) -> None:
         UsageError: If there are some, and nobody said that they may run.
     """
     trusted_run(run, agent="expert", trust=trust)
-
-
-def _code_of_edits(run: RunRecord) -> Iterator[str]:
-    """The modules that edits are imported from: all but those in our table."""
-    from agents.ownership import code_at
-    from di_envs.edits.text import EditError, read_edit
-
-    kept: Iterable[Any] = (run, *run.routes)
-    for text in dict.fromkeys(text for each in kept for text in each.interventions):
-        try:
-            place, _, name = read_edit(text).verb.rpartition(".")
-        except EditError:
-            continue  # refused where it is carried out
-        if place:
-            yield f"{name} of {code_at(place)}"
 
 
 def check_model(agent: str, *, trust: bool) -> None:

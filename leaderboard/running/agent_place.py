@@ -20,7 +20,7 @@ class AgentPlace:
         self._spec, self._watch = spec, watch
         self._process: AgentProcess | None = None
         if drives_apart(spec):
-            self._process = AgentProcess(watch.place, int(WHERE_SIGNAL))
+            self._process = AgentProcess(watch.place, WHERE_SIGNAL)
 
     def make(self) -> Agent[Any]:
         """An agent; raises whatever making it raises."""

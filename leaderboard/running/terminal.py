@@ -11,8 +11,6 @@ from collections.abc import Iterable
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from di_envs.files.plain_text import plain
-
 
 class Terminal(Console):
     """Rich's console, which spells out in a text what would steer a terminal."""
@@ -21,6 +19,8 @@ class Terminal(Console):
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
         """What is shown of something; what rich itself steers with stays."""
+        from di_envs.files.plain_text import plain  # loads more than a list of commands needs
+
         for segment in super().render(renderable, options):
             if segment.control or segment.text.isprintable():
                 yield segment

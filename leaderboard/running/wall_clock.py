@@ -13,7 +13,8 @@ from enum import IntEnum
 from typing import Any
 
 CELLS = 4  # numbers that a stopwatch is made of
-WHERE_SIGNAL = signal.SIGUSR1  # asks a process to write down where in its code it is
+# Asks a process to write down where in its code it is; 0 on systems without such signals
+WHERE_SIGNAL = int(getattr(signal, "SIGUSR1", 0))
 
 
 class Doing(IntEnum):

@@ -21,6 +21,7 @@ from leaderboard.records.footing import record_differences
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
 from leaderboard.records.resuming import resumed
+from leaderboard.replaying.recorded_edits import code_of_edits
 from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.study import StudyDisplay
 from leaderboard.running.interruption import interruptible
@@ -111,6 +112,17 @@ def _earlier(folder: Path) -> Study | None:
     return read_study(folder) if (folder / STUDY_FILE).exists() else None
 
 
+def _ours(folder: Path, driven: DrivenRow, plan: StudyPlan) -> DrivenRow:
+    """A row that the folder holds; refused if going on with it would run code that it names."""
+    code = [] if driven.row in plan.rows else list(code_of_edits(driven.row.edit.split(";")))
+    if code:
+        raise StudyError(
+            f"{folder / STUDY_FILE}: row '{driven.row.name}' is an edit that is not ours, "
+            f"{', '.join(code)}, and nobody asked for it: choose another --output"
+        )
+    return driven
+
+
 class _Driving:
     """The books of a study: its runs, what they hold, and what is missing."""
 
@@ -137,7 +149,7 @@ class _Driving:
                 )
         self._rows = {BASELINE: DrivenRow(row=BASELINE_ROW), NULL: DrivenRow(row=NULL_ROW)}
         for driven in earlier.rows if earlier else ():
-            self._rows.setdefault(driven.row.name, driven)
+            self._rows.setdefault(driven.row.name, _ours(folder, driven, plan))
         for row in plan.rows:
             self._rows[row.name] = DrivenRow(row=row, left_out=reasons[row.name])
         self._extra = dict(earlier.extra) if earlier else {}

@@ -10,18 +10,26 @@ from pathlib import Path
 
 import pytest
 
+from di_envs.files.json_values import JsonError, from_json
 from di_envs.files.plain_text import file_name, one_plain_line, plain
-from di_envs.suites import DATA
+from di_envs.suites import DATA, load_suite
 from di_envs.town import cache
 from leaderboard.commands.cli import main
 from leaderboard.pages.markup import element, json_script
 from leaderboard.records.record import AGENT_CRASHED
 from leaderboard.records.results import write_run
 from leaderboard.responding.response_files import responses_file
+from leaderboard.running.jobs import RunSpec
 from leaderboard.running.terminal import Terminal
+from leaderboard.studies import StudyError
+from leaderboard.studies.driving import StudyPlan, _ours
+from leaderboard.studies.record import DrivenRow
+from leaderboard.studies.rows import Row
+from leaderboard.studies.study_file import _Row
 from tests.leaderboard.made_records import route, run_of
 from tests.leaderboard.short_drives import short_run
 
+TOY = load_suite("toy")
 EVIL = "\x1b[2J\x1b[HThe claim stands\u202e"
 MINE = 'import pathlib\npathlib.Path("ran").touch()\n\n\nclass Mine:\n    pass\n'
 COMMANDS = {
@@ -164,3 +172,20 @@ def test_a_route_id_writes_nothing_outside_its_folder(here):
     assert any(path.name.startswith("branch-_.._.._.._PWN-") for path in new)
     assert all(path.is_relative_to(here / "run") for path in new)
     assert responses_file(Path("run"), evil, 0).parent == Path("run")
+
+
+def test_a_study_that_is_gone_on_with_runs_no_edit_that_it_names(here, capsys):
+    edit = "package.inner.Mine:speed"
+    row = DrivenRow(row=Row(name="drop-map", edit=edit), planned=1)
+    plan = StudyPlan(kind="ablation", spec=RunSpec(agent="expert"), suite=TOY, rows=())
+    with pytest.raises(StudyError, match=r"Mine of the module package\.inner"):
+        _ours(here, row, plan)
+    assert _ours(here, row, replace(plan, rows=(row.row,))) is row  # the user's own
+    assert not Path("ran").exists()
+
+
+def test_a_row_of_a_study_is_named_as_a_folder_can_be(here):
+    row = {"name": "../../out", "edit": "", "component": "", "group": "", "planned": 1}
+    row |= {"left_out": "", "wall_s": 0.0, "drives": []}
+    with pytest.raises(JsonError, match="expected a name that a folder can have"):
+        from_json(_Row, row, "study.json").driven((), "study.json", "rows[1]")

@@ -152,6 +152,7 @@ def test_answers_of_an_agents_process_are_read_as_text_and_never_run():
         theirs.send(print)  # a pickle
         with pytest.raises(AgentFaultError, match="no answer"):
             process.ask("requires")
+        assert process.id == 0  # what it answers later is no answer to another question
     finally:
         process.stop()
 
