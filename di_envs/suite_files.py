@@ -8,12 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from di_envs.files.json_values import compact, to_json
-from di_envs.suites import NO_SCENARIOS, Suite, choose_suite
+from di_envs.suites import DATA, NO_SCENARIOS, Suite, choose_suite, shipped_or_own
 from di_envs.town.loading import FROM_MAP, NO_SIGNALS, SIDECARS, SYNTHESISE
 
 # Options of an environment that may name files
 FILE_OPTIONS = ("town", "routes", "signals", "scenarios")
 IN_ROUTES = "in the route file"
+# What stands in place of a file without being a path, and where shipped files are
+_NAMES = {"signals": (SYNTHESISE, NO_SIGNALS, *SIDECARS), "scenarios": (NO_SCENARIOS,)}
+_SHIPPED = {
+    "town": (DATA, ".xodr"),
+    "routes": (DATA / "routes", ".xml"),
+    "scenarios": (DATA / "scenarios", ".json"),
+}
 
 
 def suite_of(options: Mapping[str, Any]) -> Suite:
@@ -92,10 +99,9 @@ def _with_files(options: Mapping[str, Any], place: Callable[[Path], Path | None]
 
 
 def _placed(text: str, option: str, place: Callable[[Path], Path | None]) -> str:
-    if option == "signals" and text in (SYNTHESISE, NO_SIGNALS, *SIDECARS):
-        return text
     path = Path(text)
-    bare = path.parent == Path() and not path.suffix
-    if text == NO_SCENARIOS or (bare and not path.is_file()):
+    if text in _NAMES.get(option, ()):
+        return text
+    if option in _SHIPPED and shipped_or_own(text, *_SHIPPED[option]) != path:
         return text  # a name of what is shipped
     return str(place(path) or text)
