@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.json_values import from_json, to_json
+from di_envs.files.names import name_hint
+from di_envs.sensors.camera.config import Rig
+from di_envs.sensors.lidar.config import LidarConfig
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import WorldView
 
 Observation = Mapping[str, Any]
 Control = NDArray[np.float32]  # (3,) throttle 0..1, steer -1..1 (positive right), brake 0..1
 Memory = TypeVar("Memory")
+
+# Options of its environment that an agent may ask for: where and among whom it is put to the test
+# is not for it to choose.
+SENSOR_OPTIONS: Mapping[str, Any] = {"cameras": str | Rig, "lidar": str | LidarConfig}
 
 
 class Track(StrEnum):
@@ -29,18 +38,65 @@ class Track(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
-    """What an agent needs from its environment, and so its track."""
+    """What an agent needs from its environment, and so its track: sensors, and how often it acts.
+
+    Raises:
+        ValueError: If it asks for anything else; names it.
+    """
 
     observations: tuple[str, ...] = ("prompt",)
     control_dt_s: float = 0.1
     privileged: bool = False
-    options: Mapping[str, Any] = field(default_factory=dict)  # further environment options
+    options: Mapping[str, Any] = field(default_factory=dict)  # of `SENSOR_OPTIONS`
     hd_map: bool = False  # True: the static `Town` is in the observation under the key `town`
     branchable: bool = True  # False for an agent that hides memory outside its `Memory`
 
     def __post_init__(self) -> None:
         if not self.control_dt_s > 0.0:
             raise ValueError(f"control_dt_s must be positive, not {self.control_dt_s}")
+        for name in self.options:
+            if name not in SENSOR_OPTIONS:
+                raise ValueError(
+                    f"an agent may not ask for '{name}': it says what it reads, its sensors and "
+                    f"how often it acts; all else is for who evaluates it to say. "
+                    f"Options: {name_hint(name, SENSOR_OPTIONS)}"
+                )
+
+    @classmethod
+    def agreed(cls, asked: Any) -> Self:
+        """What an agent says that it requires, checked: a copy, which it cannot change later.
+
+        Raises:
+            ValueError: If it is not of this form, or asks for what it may not.
+        """
+        try:
+            return cls(
+                observations=tuple(map(str, asked.observations)),
+                control_dt_s=float(asked.control_dt_s),
+                privileged=bool(asked.privileged),
+                options=dict(asked.options),
+                hd_map=bool(asked.hd_map),
+                branchable=bool(asked.branchable),
+            )
+        except (AttributeError, TypeError) as error:
+            raise ValueError(
+                f"an agent's `requires` is a Requirements (agents/base.py), not {asked!r}: {error}"
+            ) from error
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON values, for records and pipes."""
+        values: dict[str, Any] = to_json(self)
+        return values
+
+    @classmethod
+    def of_json(cls, values: Any) -> Self:
+        """The inverse of `as_json`.
+
+        Raises:
+            ValueError: If they are no requirements, or ask for what they may not.
+        """
+        read = from_json(cls, values, "requires", complete=True)
+        return dataclasses.replace(read, options=sensors_of_json(read.options))
 
     @property
     def track(self) -> Track:
@@ -52,6 +108,18 @@ class Requirements:
         if {"camera", "lidar"} & set(self.observations) or "prompt" not in self.observations:
             return Track.SENSORS
         return Track.PROMPT
+
+
+def sensors_of_json(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of sensors, as `RouteEnv` takes them, of the JSON values that records keep.
+
+    Raises:
+        ValueError: If one of them is no sensor.
+    """
+    return {
+        name: from_json(SENSOR_OPTIONS[name], value, "requires", f"options.{name}")
+        for name, value in options.items()
+    }
 
 
 class Agent(Protocol[Memory]):

@@ -8,9 +8,11 @@ leaderboard's workers and pools use it from above.
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -21,6 +23,7 @@ from itertools import islice
 from multiprocessing.connection import wait
 from typing import Any, Protocol, TypeVar
 
+_PR_SET_PDEATHSIG = 1  # of Linux's prctl
 FRESH = multiprocessing.get_context("spawn")  # how they begin: with nothing of their parent's
 
 J = TypeVar("J")
@@ -124,6 +127,26 @@ def ctrl_c_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with_parent() -> None:
+    """In a child: the system kills it as its parent ends, even if its code holds Python's lock.
+
+    On Linux; elsewhere `live_for_parent` has to do.
+    """
+    if sys.platform != "linux":
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    parent = multiprocessing.parent_process()
+    if parent is not None and os.getppid() != parent.pid:
+        os._exit(1)  # it ended before it was said
+
+
+def how_it_ended(exitcode: int | None) -> str:
+    """What became of a process that is no more, as the end of a sentence."""
+    if exitcode is not None and exitcode < 0:
+        return f"was killed by {signal.Signals(-exitcode).name}"
+    return f"ended by itself with exit code {exitcode}"
 
 
 def live_for_parent() -> None:

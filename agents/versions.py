@@ -10,6 +10,7 @@ import hashlib
 import importlib.util
 import sys
 from collections.abc import Sequence
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 from agents import AGENTS, SCHEMES, AgentEntry, place_and_options
@@ -62,12 +63,21 @@ def _code_of(place: str) -> Path:
     """The file of a module, or the file itself."""
     if place.endswith(".py"):
         return Path(place)
-    loaded = getattr(sys.modules.get(place), "__file__", None)
-    spec = None if loaded else importlib.util.find_spec(place)
-    found = loaded or (spec.origin if spec else None)
+    found = getattr(sys.modules.get(place), "__file__", None) or _origin(place)
     if found is None:
         raise FileNotFoundError(f"there is no file of the module '{place}' to tell it by")
     return Path(found)
+
+
+def _origin(place: str) -> str | None:
+    """Where a module's source is, found without importing the packages that it is in."""
+    top, *inner = place.split(".")
+    spec, name = importlib.util.find_spec(top), top
+    for part in inner:
+        folders = spec.submodule_search_locations if spec is not None else None
+        name = f"{name}.{part}"
+        spec = PathFinder.find_spec(name, folders) if folders is not None else None
+    return spec.origin if spec is not None else None
 
 
 def _hash(files: Sequence[Path]) -> str:

@@ -145,11 +145,12 @@ class Course:
         }
 
 
-def load_course(options: Mapping[str, Any]) -> Course:
+def load_course(options: Mapping[str, Any], *, cached: bool = True) -> Course:
     """Loads the town and plans the routes.
 
     Args:
         options: See `RouteEnvConfig`.
+        cached: Whether the town may be taken from the cache.
 
     Raises:
         ValueError: If an option is unknown or refused, or no route can be planned.
@@ -163,7 +164,7 @@ def load_course(options: Mapping[str, Any]) -> Course:
         signals=config.signals,
         scenarios=config.scenarios,
     )
-    town = load_town(suite.town_path, suite.signals)
+    town = load_town(suite.town_path, suite.signals, cached=cached)
     planned = suite.planned(town, config.route_ids, strict=config.strict)
     level = suite.traffic_in(town)
     vehicles = level.vehicles if config.traffic is None else config.traffic

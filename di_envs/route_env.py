@@ -68,13 +68,17 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         "render_fps": 10,
     }
 
-    def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
+    def __init__(
+        self, *, render_mode: str | None = None, cached: bool = True, **options: Any
+    ) -> None:
         """Loads the town and plans the routes.
 
         Args:
             render_mode: `rgb_array`: `render` returns a picture for people, see
                 `di_envs.drawing.view`. `human`: a window shows it after each reset and step. None:
                 no pictures.
+            cached: Whether the town may be taken from the cache of towns that were read before;
+                False reads its map, whatever is there.
             options: See `RouteEnvConfig`.
 
         Raises:
@@ -83,7 +87,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             RuntimeError: If there is no display for `human`.
         """
         check_render_mode(render_mode)
-        self._course = course = load_course(options)
+        self._course = course = load_course(options, cached=cached)
         self.config, self.plans = course.config, course.plans
         self.world = World(course.town, course.world_config)
         self.observation_space = course.observation_space()

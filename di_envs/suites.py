@@ -74,23 +74,23 @@ class Suite:
     @property
     def routes_path(self) -> Path:
         """The route file."""
-        return _shipped(self.routes, DATA / "routes", ".xml")
+        return shipped_or_own(self.routes, DATA / "routes", ".xml")
 
     @property
     def town_path(self) -> Path:
         """The OpenDRIVE file."""
-        return _shipped(self.town, DATA, ".xodr")
+        return shipped_or_own(self.town, DATA, ".xodr")
 
     @property
     def scenario_paths(self) -> tuple[Path, ...]:
         """The trigger files, or folders of them; none where there are none."""
         if self.scenarios is None or self.scenarios == NO_SCENARIOS:
             return ()
-        whole = _shipped(self.scenarios, DATA / "scenarios", ".json")
+        whole = shipped_or_own(self.scenarios, DATA / "scenarios", ".json")
         if whole.exists():
             return (whole,)
         names = [name.strip() for name in self.scenarios.split(",")]
-        return tuple(_shipped(name, DATA / "scenarios", ".json") for name in names)
+        return tuple(shipped_or_own(name, DATA / "scenarios", ".json") for name in names)
 
     def specs(
         self, town: str | None = None, route_ids: Sequence[str] | None = None
@@ -281,7 +281,7 @@ def _refuse_scenarios(path: Path) -> NoReturn:
     raise ValueError(f"There is no trigger file or folder '{path}'; check the path.")
 
 
-def _shipped(name: str, folder: Path, suffix: str) -> Path:
+def shipped_or_own(name: str, folder: Path, suffix: str) -> Path:
     """A shipped file by its bare name, or the file at a path."""
     bare = Path(name)
     if bare.parent == Path() and bare.suffix in ("", suffix):

@@ -1,7 +1,7 @@
 """Trains PPO on single crossings from the prompt, and saves a model that the leaderboard scores.
 
     python examples/train_ppo.py                     # writes ppo.zip and ppo.monitor.csv
-    driveinsight evaluate --agent sb3:ppo.zip --suite town05_tiny
+    driveinsight evaluate --agent sb3:ppo.zip --suite town05_tiny --trust
 
 It needs Stable-Baselines3: `pip install -c constraints.txt -e ".[rl]"`. Seeds of training begin at
 1,000,000 so that no world of an evaluation is among them.
@@ -135,7 +135,7 @@ def main(training: Training) -> None:
     learner.save(training.model)
     worlds.close()
     print(f"Written: {training.model} and {training.model.with_suffix('.monitor.csv')}")
-    print(f"Next: driveinsight evaluate --agent sb3:{training.model} --suite town05_tiny")
+    print(f"Next: driveinsight evaluate --agent sb3:{training.model} --suite town05_tiny --trust")
 
 
 if __name__ == "__main__":

@@ -31,8 +31,6 @@ from di_envs.town.plan import RoutePlan
 
 TICK_S = 0.05  # the Leaderboard's; an agent decides at every tick
 HOST, PORT = "localhost", 2000  # CARLA's defaults, told to 2.x agents; nobody listens there
-# Generators that foreign code draws from, where it has imported them, and how they are seeded
-_GENERATORS = {"random": "seed", "numpy.random": "seed", "torch": "manual_seed"}
 _HINTS = {
     "carla": "Install CARLA's wheel: pip install 'driveinsight[carla]'.",
     "srunner": "CARLA's ScenarioRunner is not here: agents that ask the simulator for the truth "
@@ -98,7 +96,6 @@ class CarlaAgent:
             SensorSuiteError: If its `sensors()` are refused. What its own code raises goes on.
         """
         self.close()
-        _seed_generators(seed)
         self._agent, self._suite = self._built(plan)
         self._requires = _requirements(self._suite)
         return CarlaMemory(origin_latitude=plan.geo_origin[0])
@@ -227,11 +224,3 @@ def _leaderboard_of(agent: type[Any]) -> str:
         if parameter.kind is parameter.POSITIONAL_OR_KEYWORD
     ]
     return "2.1" if len(needed) > 1 and needed[1].default is inspect.Parameter.empty else "1.0"
-
-
-def _seed_generators(seed: int) -> None:
-    """Begins hidden generators anew, so that a route is the same whatever was driven before it."""
-    for name, function in _GENERATORS.items():
-        module = sys.modules.get(name)
-        if module is not None:
-            getattr(module, function)(seed % 2**32)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from agents import load_agent
-from agents.base import Agent
+from agents.base import Agent, Requirements
 from agents.processes import Pool, in_order, processes
 from agents.training.corrections import corrected_drive
 from agents.training.frames import (
@@ -237,7 +237,7 @@ def _check_same(path: Path, facts: Mapping[str, Any], job: DriveJob) -> None:
 
 @lru_cache(2)
 def _environment(town: str, block: int, driver: str) -> RouteEnv:
-    requires = _driver(driver).requires
+    requires = Requirements.agreed(_driver(driver).requires)
     return RouteEnv(
         observations=requires.observations,
         control_dt_s=requires.control_dt_s,

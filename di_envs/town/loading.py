@@ -38,7 +38,11 @@ FROM_MAP, SYNTHESISE, NO_SIGNALS = "map", "synthesise", "none"
 
 
 def load_town(
-    town: str | Path, signals: str | Path | None = None, *, cache_folder: Path | None = None
+    town: str | Path,
+    signals: str | Path | None = None,
+    *,
+    cache_folder: Path | None = None,
+    cached: bool = True,
 ) -> Town:
     """Loads a town.
 
@@ -50,6 +54,7 @@ def load_town(
             junctions' shapes (`di_envs.town.reading.guessing`); a warning says what it made.
             "none": there are none.
         cache_folder: Where parsed towns are kept; by default the user's cache folder.
+        cached: Whether to look there, and to keep the town there; False reads the map itself.
 
     Raises:
         FileNotFoundError: If there is no such file, shipped town or sidecar.
@@ -62,10 +67,11 @@ def load_town(
     key = cache.content_hash(content, source.encode() + b"\0" + told)
     folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
     text = decode_xml(content, str(path))
-    loaded = cache.load_cached(key, path.stem, text, folder)
+    loaded = cache.load_cached(key, path.stem, text, folder) if cached else None
     if loaded is None:
         loaded = cache.freeze(_parse(path, text, source, sidecar, key))
-        cache.store(loaded, folder)
+        if cached:
+            cache.store(loaded, folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
     if source == SYNTHESISE:

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from rich.console import Console
-
 from leaderboard.commands.ending import say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.study_arguments import StudyArguments, run_study
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from leaderboard.studies.record import Study
@@ -72,7 +71,7 @@ class _WhatMatters:
 
         ablation = work_out(study)
         written = write_ablation(folder, ablation)
-        Console().print(ablation_tables(ablation))
+        Terminal().print(ablation_tables(ablation))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
         worst = min(ablation.rows, key=lambda row: row.difference.mean, default=None)
         if worst is None:

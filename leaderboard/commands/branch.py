@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.terminal import Terminal
 
 BRANCH_HELP = """Ask what would have happened: change the world at a moment of a recorded drive.
 
@@ -46,6 +47,12 @@ class Branch:
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Which of the run's seeds."""
 
+    agent: Annotated[str | None, says("AGENT", "the run's")] = None
+    """Where the agent is found now; one of yours that the folder names needs it, or --trust."""
+
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Run what the folder names: an agent or edits that are not ours."""
+
     output: Annotated[Path | None, says("DIR", "a new one in RUN")] = None
     """Folder for the picture and the edited drive."""
 
@@ -61,7 +68,7 @@ class Branch:
 
         try:
             edits = read_world_edits(self.world)
-            run = read_run(self.folder)
+            run = trusted_run(read_run(self.folder), agent=self.agent, trust=self.trust)
             record = chosen_route(run, self.route, self.seed)
             folder = self.output or self._new_folder()
             prepare_folder(folder, overwrite=self.overwrite)
@@ -86,7 +93,7 @@ class Branch:
             write_branch_picture(picture, run, futures)
         except (BranchError, EditError, ReplayError, ResultsError, OSError) as error:
             raise UsageError(str(error)) from error
-        Console().print(*branch_tables(futures))
+        Terminal().print(*branch_tables(futures))
         if same_future(futures.recorded, futures.edited):
             say("Both futures are the same, to the bit.")
         say(
@@ -97,7 +104,9 @@ class Branch:
 
     def _new_folder(self) -> Path:
         """`RUN/branch-ROUTE-SECONDS`, or -2 and so on where that is taken."""
-        name = f"branch-{self.route}-{self.at:g}s"
+        from di_envs.files.plain_text import file_name
+
+        name = f"branch-{file_name(self.route)}-{self.at:g}s"
         folder, number = self.folder / name, 2
         while folder.exists():
             folder, number = self.folder / f"{name}-{number}", number + 1

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from rich.console import Console
+import tyro
 from rich.table import Table
 
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.commands.trusting import check_model
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from agents.processes import Pool
@@ -66,6 +68,9 @@ class Collect:
     """Number of each town's first drive; it says route and seed. Begin where earlier drives ended,
     and a learner is corrected in places that it has not been trained on."""
 
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Load a --driver's file that holds pickles (sb3:), which runs the code in them."""
+
     output: Annotated[Path, says("DIR", "data")] = Path("data")
     """Folder for the drives of this driver."""
 
@@ -77,6 +82,7 @@ class Collect:
             raise UsageError("--first must not be negative")
         if self.address and self.engine != "ray":
             raise UsageError("--address is of a Ray cluster: add --engine ray")
+        check_model(self.driver, trust=self.trust)
 
         from agents.training.collect import CARD_FILE, compile_for_drives, data_card
         from agents.training.frames import FRAME_S, DriveFileError
@@ -93,7 +99,7 @@ class Collect:
             for town in towns:
                 check_name(town, KNOWN_TOWNS, "training town")
             hiding = Hiding.of(self._hidden())
-            with compile_progress(Console(stderr=True)):
+            with compile_progress(Terminal(stderr=True)):
                 compile_for_drives(towns[0])
             complete = self._collect(towns, hiding)
             card = data_card(self.output)
@@ -102,7 +108,7 @@ class Collect:
         write_whole(self.output / CARD_FILE, indented(card))
         say(f"{card['drives']} drives with {card['moments']} moments, {FRAME_S} s apart.")
         say(f"Weather: {card['weather']}.")
-        Console().print(card_table(card))
+        Terminal().print(card_table(card))
         if not complete:
             say("Stopped; what was driven is kept.", "Next: the same command again goes on")
             return EXIT_INTERRUPTED
@@ -156,7 +162,7 @@ class Collect:
             pool=self._pool(),
         )
         with (
-            interruptible() as interruption,
+            interruptible(ends_process=True) as interruption,
             work_bar("driving", "moments") as bar,
             closing(outcomes),
         ):

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.running.terminal import Terminal
 
 COMPARE_HELP = """Pair two runs by route and seed: what changed in the second, how surely, and why.
 
@@ -50,6 +50,6 @@ class Compare:
             comparison = compare_runs(*runs)
         except (ResultsError, PairingError, ValueError) as error:
             raise UsageError(str(error)) from error
-        Console().print(comparison_tables(comparison))
+        Terminal().print(comparison_tables(comparison))
         say(f"Next: driveinsight verify {self.second}")
         return 0

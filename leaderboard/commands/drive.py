@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
 from leaderboard.commands.scene_arguments import SceneArguments, says
+from leaderboard.running.terminal import Terminal
 
 DRIVE_HELP = """Drive one route and watch: its events, its score, and a video if wanted.
 
@@ -49,7 +49,11 @@ class Drive(SceneArguments):
         from leaderboard.running.video import VideoError, check_video
 
         spec = RunSpec(
-            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+            agent=self.agent,
+            options=options,
+            rules=self.rules,
+            interventions=self.edits(),
+            isolate=not self.no_isolate,
         )
         try:
             if self.video is not None:
@@ -58,7 +62,7 @@ class Drive(SceneArguments):
                 spec,
                 route_id=self.route,
                 seed=self.seed,
-                console=Console(stderr=True),
+                console=Terminal(stderr=True),
                 video=self.video,
                 camera=not self.no_camera,
             )

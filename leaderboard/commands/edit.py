@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
-
 from leaderboard.commands.ending import say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.study_arguments import StudyArguments, run_study
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from leaderboard.studies.record import Study
@@ -72,7 +71,7 @@ class _WhatHolds:
             study,
             choose_experiments(self.names),
             workers=self.workers,
-            console=Console(stderr=True),
+            console=Terminal(stderr=True),
         )
 
     def print_study(self, study: Study, folder: Path) -> list[str]:
@@ -81,7 +80,7 @@ class _WhatHolds:
         from leaderboard.tables.prompt_editing_table import prompt_editing_tables
 
         written = write_prompt_editing(folder, study)
-        Console().print(prompt_editing_tables(study))
+        Terminal().print(prompt_editing_tables(study))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
         return [
             f"Next: driveinsight verify {folder / 'rows' / 'baseline'}       does the claim stand?"

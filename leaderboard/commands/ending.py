@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from rich.console import Console
 from rich.markup import escape
+
+from leaderboard.running.terminal import Terminal
 
 EXIT_CRASHED = 1
 EXIT_REFUTED = 1  # a claim does not stand
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
+LONGEST_LINE = 4000  # characters that a complaint may have
 
 
 class UsageError(Exception):
@@ -17,10 +19,12 @@ class UsageError(Exception):
 
 def complain(message: str, kind: str = "[red]error[/red]") -> None:
     """Prints one line on stderr: the kind, then the message."""
-    line = " ".join(message.split())
-    Console(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
+    from di_envs.files.plain_text import one_plain_line  # loads more than a list of commands needs
+
+    line = one_plain_line(message, LONGEST_LINE)
+    Terminal(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
 
 
 def say(*lines: object) -> None:
     """Prints lines on stdout as they are: paths and commands that can be copied whole."""
-    Console().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)
+    Terminal().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)

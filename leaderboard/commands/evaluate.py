@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from leaderboard.records.record import RunRecord
@@ -64,21 +64,27 @@ class Evaluate(EngineArguments, SceneArguments):
         folder = self.output or self._default_folder(suite.name)
 
         from leaderboard.records.results import ResultsError
+        from leaderboard.running.interruption import interruptible
         from leaderboard.running.jobs import RunSpec, SetupError
         from leaderboard.running.runner import evaluate
 
         spec = RunSpec(
-            agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
+            agent=self.agent,
+            options=options,
+            rules=self.rules,
+            interventions=self.edits(),
+            isolate=not self.no_isolate,
         )
         try:
-            run = evaluate(
-                spec,
-                range(self.seeds),
-                suite=suite,
-                folder=folder,
-                engine=self.make_engine(),
-                existing=self._existing(),
-            )
+            with interruptible(ends_process=True):
+                run = evaluate(
+                    spec,
+                    range(self.seeds),
+                    suite=suite,
+                    folder=folder,
+                    engine=self.make_engine(),
+                    existing=self._existing(),
+                )
         except (SetupError, ResultsError) as error:
             raise UsageError(str(error)) from error
         finally:
@@ -107,8 +113,9 @@ class Evaluate(EngineArguments, SceneArguments):
 
 def plain_name(name: str) -> str:
     """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
-    last = name.rpartition(":")[2]
-    return "".join(c if c.isalnum() or c in "_-." else "_" for c in last)
+    from di_envs.files.plain_text import file_name
+
+    return file_name(name.rpartition(":")[2].replace("/", "_"))
 
 
 def _remove_if_empty(folder: Path) -> None:
@@ -120,7 +127,7 @@ def _print_run(run: RunRecord, folder: Path) -> None:
     from leaderboard.records.results import CARLA_FILE, RECORD_FILE
     from leaderboard.tables.run_tables import print_run
 
-    print_run(run, Console())
+    print_run(run, Terminal())
     say(
         f"Written: {folder / CARLA_FILE} (CARLA's schema) and {folder / RECORD_FILE} (all of it).",
         *_next_steps(run, folder),

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.terminal import Terminal
 
 EXPLAIN_HELP = """Show why an agent drove a route as it did: one HTML page to look at.
 
@@ -57,7 +57,11 @@ class Explain:
     """How often the agent is looked into, and a picture taken."""
 
     agent: Annotated[str | None, says("AGENT", "the run's")] = None
-    """Where the agent is found now, if its weights have moved."""
+    """Where the agent is found now, if its weights have moved; one of yours that the folder names
+    needs it, or --trust."""
+
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Run what the folder names: an agent or edits that are not ours."""
 
     output: Annotated[Path | None, says("FILE", "explain-ROUTE.html in RUN")] = None
     """The page's file."""
@@ -65,6 +69,7 @@ class Explain:
     def run(self) -> int:
         """Writes the page; returns the exit code."""
         from di_envs.edits.text import EditError
+        from di_envs.files.plain_text import file_name
         from leaderboard.explaining.questions import read_asked
         from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
         from leaderboard.records.results import ResultsError, read_run, run_folder
@@ -76,7 +81,7 @@ class Explain:
             chosen_route(run, self.route, self.seed)
         except (EditError, ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
-        run = dataclasses.replace(run, agent=self.agent or run.agent)
+        run = trusted_run(run, agent=self.agent, trust=self.trust)
 
         from leaderboard.explaining.explanation import ExplainError
         from leaderboard.explaining.route import explain_route
@@ -86,8 +91,8 @@ class Explain:
         from leaderboard.replaying.replay import ReplayError
         from leaderboard.running.compiling import compile_progress
 
-        console = Console(stderr=True)
-        path = self.output or folder / f"explain-{self.route}.html"
+        console = Terminal(stderr=True)
+        path = self.output or folder / f"explain-{file_name(self.route)}.html"
         try:
             bar = work_bar("explaining", "decisions", console=console, transient=True)
             with compile_progress(console), bar:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from agents.training.export import ShardJob
@@ -72,7 +72,7 @@ class Export:
                 seed=self.seed,
             )
             jobs = shard_jobs(self.data, self.output, config, self.drives_per_shard)
-            with compile_progress(Console(stderr=True)):
+            with compile_progress(Terminal(stderr=True)):
                 compile_for_shards(jobs[0])
             written = self._export(jobs)
         except (ValueError, OSError, DriveFileError) as error:
@@ -94,7 +94,11 @@ class Export:
 
         moments = 0
         done = export(jobs, workers=self.workers)
-        with interruptible() as interruption, work_bar("rendering", "shards") as bar, closing(done):
+        with (
+            interruptible(ends_process=True) as interruption,
+            work_bar("rendering", "shards") as bar,
+            closing(done),
+        ):
             task = bar.add_task("", total=len(jobs))
             for outcome in done:
                 moments += outcome

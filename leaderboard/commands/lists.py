@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rich.console import Console
+from leaderboard.running.terminal import Terminal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +15,7 @@ class Agents:
         """Prints the list; returns the exit code."""
         from leaderboard.tables.lists import agent_table, scheme_table
 
-        Console().print(
+        Terminal().print(
             agent_table(),
             scheme_table(),
             "Your own: --agent module:Class or --agent path/to/file.py:Class (see agents/base.py).",
@@ -34,7 +34,7 @@ class Suites:
         """Prints the list; returns the exit code."""
         from leaderboard.tables.lists import scenario_table, suite_table
 
-        Console().print(
+        Terminal().print(
             suite_table(),
             scenario_table(),
             "Your own: --town FILE.xodr --routes FILE.xml --scenarios FILE.json (CARLA's formats).",

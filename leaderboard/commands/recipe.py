@@ -7,9 +7,8 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from agents.training.recipes.kinds import Machine
@@ -96,7 +95,7 @@ def _list(recipe: Recipe, output: Path) -> None:
     from leaderboard.tables.recipe_table import recipe_table
 
     found = standings(recipe, output)
-    Console().print(recipe_table(found))
+    Terminal().print(recipe_table(found))
     left = [standing for standing in found if standing.state != "done"]
     if left:
         say(f"Next: driveinsight train --recipe {recipe.path} --output {output}")

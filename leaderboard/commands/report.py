@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, complain, say
 from leaderboard.commands.scene_arguments import says
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.terminal import Terminal
 
 REPORT_HELP = """Write a run as one HTML page: tables, infractions on a map, replays of routes.
 
@@ -54,7 +54,7 @@ class Report:
         )
         from leaderboard.running.compiling import compile_progress
 
-        console = Console(stderr=True)
+        console = Terminal(stderr=True)
         path = self.output or folder / "report.html"
         try:
             count = len(chosen_routes(run, self.route_ids))

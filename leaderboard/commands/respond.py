@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from leaderboard.records.record import RouteRecord, RunRecord
@@ -58,7 +58,11 @@ class Respond:
     """Moments to mark in the figures of --route."""
 
     agent: Annotated[str | None, says("AGENT", "the run's")] = None
-    """Where the agent is found now, if its weights have moved."""
+    """Where the agent is found now, if its weights have moved; one of yours that the folder names
+    needs it, or --trust."""
+
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Run what the folder names: an agent or edits that are not ours."""
 
     output: Annotated[Path | None, says("DIR", "responses in RUN")] = None
     """Folder for records, figures and tables."""
@@ -76,6 +80,7 @@ class Respond:
             run = read_run(folder)
         except ResultsError as error:
             raise UsageError(str(error)) from error
+        run = trusted_run(run, agent=self.agent, trust=self.trust)
         records = self._chosen(run)
         target = self.output or folder / FOLDER
         try:
@@ -118,10 +123,8 @@ class Respond:
         from leaderboard.responding.measuring import measured
         from leaderboard.running.compiling import compile_progress
 
-        if self.agent is not None:
-            run = dataclasses.replace(run, agent=self.agent)
         begins = dict(zip([record.index for record in records], _begins(records), strict=True))
-        console = Console(stderr=True)
+        console = Terminal(stderr=True)
         bar = work_bar("looking", "s", console=console, transient=True)
         try:
             with compile_progress(console), bar:
@@ -138,12 +141,13 @@ class Respond:
 
     def _written(self, target: Path, drives: list[DriveResponses]) -> list[Path]:
         """Figures and tables; the tables are printed too."""
+        from di_envs.files.plain_text import file_name
         from leaderboard.pages.response_figures import write_figures
         from leaderboard.pages.situation_figure import situation_figure
         from leaderboard.responding.moments import marked_moments, moment_name
         from leaderboard.tables.response_tables import tables_of, write_tables
 
-        console = Console()
+        console = Terminal()
         tables = tables_of(drives)
         for table in tables:
             console.print(table.rich())
@@ -155,9 +159,8 @@ class Respond:
         drive = drives[0]
         marked = marked_moments(drive, self.at)
         say("Marked: " + "; ".join(moment_name(drive, index) for index in marked))
-        return list(
-            write_figures(target, f"route-{drive.route_id}-seed-{drive.seed}", drive, marked)
-        )
+        name = f"route-{file_name(drive.route_id)}-seed-{drive.seed}"
+        return list(write_figures(target, name, drive, marked))
 
     def _next(self) -> str:
         if self.route is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from leaderboard.commands.ending import UsageError
+from leaderboard.commands.trusting import check_model
 
 if TYPE_CHECKING:
     from di_envs.suites import Suite
@@ -65,6 +66,13 @@ class SceneArguments:
     intervene: Annotated[str, says("EDITS", "none")] = ""
     """Edits of what the agent sees, joined by `;`, such as "drop:routing; set:speed=0@t>5"."""
 
+    no_isolate: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Drive an agent that is not ours in the world's own process. It can reach the true world
+    there, and the results say so."""
+
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Load an agent's file that holds pickles (sb3:), which runs the code in them."""
+
     def edits(self) -> tuple[ObservationEdit, ...]:
         """What is edited of what the agent sees.
 
@@ -92,6 +100,8 @@ class SceneArguments:
         """
         from di_envs.config import RouteEnvConfig
         from di_envs.suites import choose_suite
+
+        check_model(self.agent, trust=self.trust)
 
         given = {name: getattr(self, name) for name in _OPTIONS}
         options = {n: value for n, value in given.items() if not (value is None or value is False)}

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.running.terminal import Terminal
 
 SCORE_HELP = """Score a finished run by other rules, without driving, beside its own.
 
@@ -51,7 +51,7 @@ class ScoreByRules:
                 write_run(self.output, other)
         except (ResultsError, ValueError) as error:
             raise UsageError(str(error)) from error
-        Console().print(rescoring_table(run, other))
+        Terminal().print(rescoring_table(run, other))
         if self.output is None:
             say("Nothing was written: pass --output DIR to keep the run under these rules.")
         else:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import UsageError
+from leaderboard.running.terminal import Terminal
 
 SHOW_HELP = """Print the table of a run that was evaluated before.
 
@@ -33,5 +33,5 @@ class Show:
             run = read_run(self.folder)
         except ResultsError as error:
             raise UsageError(str(error)) from error
-        print_run(run, Console())
+        print_run(run, Terminal())
         return 0

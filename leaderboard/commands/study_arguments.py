@@ -101,6 +101,7 @@ def _drive(arguments: StudyArguments, question: StudyQuestion) -> int:
     folder = arguments.output or Path("results") / name.replace(" ", "-")
 
     from leaderboard.pages.study_files import keep_study
+    from leaderboard.running.interruption import interruptible
     from leaderboard.running.jobs import RunSpec
     from leaderboard.studies.driving import StudyPlan, drive_study
 
@@ -109,9 +110,10 @@ def _drive(arguments: StudyArguments, question: StudyQuestion) -> int:
         options=options,
         rules=arguments.rules,
         interventions=arguments.edits(),
+        isolate=not arguments.no_isolate,
     )
     engine = arguments.make_engine()
-    with arguments.connected():
+    with arguments.connected(), interruptible(ends_process=True):
         study, interrupted = drive_study(
             StudyPlan(kind=question.kind, spec=spec, suite=suite, rows=rows),
             arguments.seeds,

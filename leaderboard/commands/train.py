@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
 from leaderboard.commands.recipe import run_recipe_file
 from leaderboard.commands.scene_arguments import says
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from agents.training.session import Session, TrainingPlan
@@ -152,15 +152,17 @@ class Train:
         from agents.driveinsight.weights import WeightsError
         from agents.training.config import TrainingError
         from agents.training.frames import DriveFileError
+        from leaderboard.running.interruption import interruptible
         from leaderboard.running.training import CheckPlan, run_training
         from leaderboard.running.training_check import CheckError
 
         check = CheckPlan(routes=self.check_routes, every=self.check_every)
-        console = Console(stderr=True)
+        console = Terminal(stderr=True)
         try:
-            session, done = run_training(
-                self._plan(), check, console=console, on_begin=_tell_beginning
-            )
+            with interruptible(ends_process=True):
+                session, done = run_training(
+                    self._plan(), check, console=console, on_begin=_tell_beginning
+                )
         except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
             raise UsageError(str(error)) from error
         if session.training.team.first:

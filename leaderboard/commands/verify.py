@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 
 from leaderboard.commands.ending import EXIT_REFUTED, UsageError, say
 from leaderboard.commands.scene_arguments import says
+from leaderboard.commands.trusting import trusted_edits
 from leaderboard.running.displays.work_bar import work_bar
+from leaderboard.running.terminal import Terminal
 
 if TYPE_CHECKING:
     from leaderboard.records.record import RunRecord
@@ -43,6 +44,9 @@ class Verify:
     observations: tyro.conf.FlagCreatePairsOff[bool] = False
     """Make what the agent saw again, with its sensors, and compare that too."""
 
+    trust: tyro.conf.FlagCreatePairsOff[bool] = False
+    """With --observations: run edits of what the agent saw that are not ours."""
+
     def run(self) -> int:
         """Verifies; returns the exit code."""
         if self.workers < 1:
@@ -53,13 +57,15 @@ class Verify:
         from leaderboard.replaying.verify import verify_run
         from leaderboard.running.compiling import compile_progress
 
-        console = Console(stderr=True)
+        console = Terminal(stderr=True)
         try:
             run_folder(self.path)
         except ResultsError as error:
             raise UsageError(str(error)) from error
         try:
             run = read_run(self.path)
+            if self.observations:
+                trusted_edits(run, trust=self.trust)
             bar = work_bar("replaying", "routes", console=console, transient=True)
             with compile_progress(console), bar:
                 task = bar.add_task("", total=len(run.routes))
@@ -82,6 +88,8 @@ class Verify:
 
 def verdict_lines(verdict: Verdict, run: RunRecord, *, seen: bool) -> list[str]:
     """What was found, in lines to print: the verdict last."""
+    from leaderboard.records.claim_text import claim_lines
+
     lines = [f"results: {problem}" for problem in verdict.problems]
     for route in verdict.routes:
         name = f"route {route.record.route_id}, seed {route.record.seed}"
@@ -92,6 +100,7 @@ def verdict_lines(verdict: Verdict, run: RunRecord, *, seen: bool) -> list[str]:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
     if verdict.differences:
         lines.append(f"Here is {'; '.join(verdict.differences)}: bits may differ for that alone.")
+    lines += claim_lines(run)
     if not run.scored:
         return [*lines, "There is no claim: no route was driven."]
     return [*lines, _conclusion(verdict, run, seen=seen)]

@@ -1,13 +1,18 @@
-"""HTML elements as text: every value is escaped on its way in, so no name can break a page."""
+"""HTML elements as text: every value is escaped on its way in, so no name can break a page.
+
+Nor can one turn a line around: characters that nobody sees are spelled out.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
 from typing import Any
+
+from di_envs.files.plain_text import plain
 
 
 class Markup(str):
@@ -28,7 +33,7 @@ def element(name: str, *content: Content, **attributes: object) -> Markup:
         attributes: By name, `_` for `-` within and after words of Python; None leaves one out.
     """
     pairs = (
-        f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"'
+        f' {key.rstrip("_").replace("_", "-")}="{escape(plain(str(value)))}"'
         for key, value in attributes.items()
         if value is not None
     )
@@ -37,7 +42,9 @@ def element(name: str, *content: Content, **attributes: object) -> Markup:
 
 def joined(parts: Iterable[Content]) -> Markup:
     """Parts one after the other; plain text is escaped."""
-    return Markup("".join(part if isinstance(part, Markup) else escape(part) for part in parts))
+    return Markup(
+        "".join(part if isinstance(part, Markup) else escape(plain(part)) for part in parts)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +111,18 @@ def _cell(heading: Heading, cell: Cell) -> Markup:
 
 def json_script(identity: str, value: Any) -> Markup:
     """JSON that a script of the page reads by its id; nothing in it can end the element."""
-    text = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    text = json.dumps(_plain(value), separators=(",", ":"), allow_nan=False)
+    text = text.replace("<", "\\u003c")
     return Markup(f'<script type="application/json" id="{identity}">{text}</script>')
+
+
+def _plain(value: Any) -> Any:
+    """JSON values with plain texts."""
+    if isinstance(value, str):
+        return plain(value)
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def static_text(name: str) -> str:

@@ -21,6 +21,7 @@ from leaderboard.pages.report_tables import (
     summary_cards,
 )
 from leaderboard.pages.route_films import RouteFilm, event_heads, film_routes
+from leaderboard.records.claim_text import NOT_ISOLATED, in_reach
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.replay import ReplayError, replay_env
@@ -136,6 +137,8 @@ def _notes(run: RunRecord, films: Sequence[RouteFilm]) -> Iterator[str]:
     done = dict.fromkeys(text for film in films for text in film.record.interventions)
     if done:
         yield f"With what was done to the world, or to what the agent saw: {'; '.join(done)}."
+    if in_reach(run):
+        yield NOT_ISOLATED
     for route_id, why in run.refused.items():
         reason = why.removeprefix(f"Route '{route_id}': ")
         yield f"Route {route_id} could not be planned and is in no mean: {reason}"

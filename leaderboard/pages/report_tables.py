@@ -9,6 +9,7 @@ from di_envs.rules import rules_named
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from leaderboard.pages.markup import Cell, Content, Heading, Markup, TableOf, element, joined
+from leaderboard.records.claim_text import asked_for
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
 from leaderboard.statistics.confidence import mean_interval
@@ -212,6 +213,7 @@ def facts_table(run: RunRecord) -> Markup:
         "town": f"{run.town} ({run.town_hash})",
         "routes": run.routes_hash,
         "options": options or "the suite's",
+        "asked for": asked_for(run.requires),
         "rules": run.rules,
         "seeds": ", ".join(map(str, run.seeds)),
         "versions": ", ".join(f"{name} {version}" for name, version in run.versions.items()),

@@ -24,6 +24,7 @@ _CALLED = {
     "requires": "what the agent requires",
     "routes_hash": "the hash of the routes",
     "town_hash": "the hash of the town's map",
+    "world": "what the suite's files hold",
 }
 
 

@@ -181,6 +181,9 @@ class RunRecord:
             `WORLD_VERSION`. Python's and ours are there for information.
         cpu: CPU capability that the kernels were compiled for.
         routes_hash: Of the ids and points of all routes that the run is over.
+        world: What its suite was made of, by content: see `di_envs.suite_files.content_of`; empty
+            in records from before it was kept.
+        isolated: Whether an agent that is not ours drove in a process of its own.
         planned: Number of (route, seed) pairs that were asked for.
         interventions: What was edited of what the agent saw, in every route, as text.
         refused: Why routes of the file could not be planned, by their id; `planned` is without.
@@ -204,6 +207,8 @@ class RunRecord:
     cpu: str
     planned: int
     interventions: tuple[str, ...] = ()
+    world: Mapping[str, str] = field(default_factory=dict)
+    isolated: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     routes: tuple[RouteRecord, ...] = ()

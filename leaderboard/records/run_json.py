@@ -15,7 +15,7 @@ FORMAT = "driveinsight-run"
 ROUTE_FORMAT = "driveinsight-route"
 FORMAT_VERSION = 3
 # Left out where empty, as in files from before there were any
-_SINCE = ("interventions", "refused", "notes")
+_SINCE = ("interventions", "world", "isolated", "refused", "notes")
 
 
 def run_hash(run: RunRecord) -> str:
@@ -50,7 +50,8 @@ def run_from_json(content: Mapping[str, Any], source: str = "run") -> RunRecord:
     Raises:
         JsonError: If a field is missing, unknown or of another type.
     """
-    values: dict[str, Any] = {"interventions": [], "refused": {}, "notes": [], "routes": []}
+    empty = {"interventions": [], "world": {}, "isolated": False, "refused": {}, "notes": []}
+    values: dict[str, Any] = {**empty, "routes": []}
     for name, value in content.items():
         if name == "routes":
             raise JsonError(f"{source}: unknown field 'routes'; each has a file of its own")

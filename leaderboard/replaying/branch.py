@@ -143,6 +143,7 @@ def branch_run(run: RunRecord, branch: Branch) -> RunRecord:
         options=options,
         seeds=(branch.edited.seed,),
         planned=1,
+        isolated=False,  # it drove on here
         refused={},
         routes=(branch.edited,),
     )

@@ -6,12 +6,13 @@ from typing import Any
 
 from agents import AgentSpecError
 from agents.base import Agent
+from agents.faults import agents_code, describe
+from agents.generators import generators
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.recorded_edits import seen_edits
 from leaderboard.replaying.replay import ReplayError, replay_env, sensor_options
-from leaderboard.running.episode import describe
 from leaderboard.running.front_camera import with_front_camera
 from leaderboard.running.interventions import Interventions, seen_space, sort_interventions
 from wrappers.interventions.eyes import Eyes
@@ -47,12 +48,16 @@ def run_agent(run: RunRecord, env: RouteEnv) -> Agent[Any]:
         RetraceError: If it cannot be made here.
     """
     try:
-        return run_interventions(run, env).agent(run.agent)
+        with generators() as drawn, agents_code():
+            drawn.begin(0)  # as where it drove
+            return run_interventions(run, env).agent(run.agent)
+    except KeyboardInterrupt:
+        raise
     except EditError as error:
         raise RetraceError(f"the run's interventions cannot be made here: {error}") from error
     except AgentSpecError as error:
         raise RetraceError(f"the run's agent is not to be had here: {error}") from error
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise RetraceError(f"agent '{run.agent}' cannot be made: {describe(error)}") from error
 
 

@@ -7,9 +7,10 @@ edit of one's own is imported when it is read, which looking at a record must no
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from agents.ownership import code_at
 from di_envs.edits.text import EditError, EditText, read_edit
 from di_envs.edits.world import is_world_edit, world_edit
 from leaderboard.replaying.timed_edits import TimedEdit
@@ -34,6 +35,17 @@ def seen_texts(interventions: Iterable[str]) -> tuple[str, ...]:
         EditError: If one of them does not have the form of an edit.
     """
     return tuple(text for text in interventions if not is_world_edit(read_edit(text)))
+
+
+def code_of_edits(interventions: Iterable[str]) -> Iterator[str]:
+    """What would be imported to carry edits out: of those of our table, nothing."""
+    for text in dict.fromkeys(interventions):
+        try:
+            place, _, name = read_edit(text).verb.rpartition(".")
+        except EditError:
+            continue  # refused where it is carried out
+        if place:
+            yield f"{name} of {code_at(place)}"
 
 
 def seen_edits(interventions: Iterable[str]) -> tuple[ObservationEdit, ...]:

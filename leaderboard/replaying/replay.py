@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.base import SENSOR_OPTIONS, Requirements, sensors_of_json
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
-from di_envs.sensors.camera.config import CameraConfig, Rig
-from di_envs.sensors.lidar.config import LidarConfig
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event, WorldView
 from leaderboard.records.record import RouteRecord, RunRecord
@@ -28,7 +27,6 @@ from leaderboard.running.jobs import Job
 from leaderboard.running.log import EpisodeLog
 
 CHEAPEST = ("inertial",)  # the group of observations that costs least
-_SENSOR_OPTIONS = ("observations", "cameras", "lidar")
 
 
 class ReplayError(Exception):
@@ -76,11 +74,9 @@ def replay_env(
     Raises:
         ReplayError: If this town is not the run's, or an option or file is not to be had here.
     """
-    required: Mapping[str, Any] = run.requires.get("options", {})
-    kept = {**required, **run.options}
-    for name in _SENSOR_OPTIONS:
-        kept.pop(name, None)
-    kept["control_dt_s"] = run.options.get("control_dt_s", run.requires["control_dt_s"])
+    seen_only = ("observations", *SENSOR_OPTIONS)  # all that an agent may have asked for
+    kept = {name: value for name, value in run.options.items() if name not in seen_only}
+    kept["control_dt_s"] = run.options.get("control_dt_s", required(run).control_dt_s)
     try:
         env = RouteEnv(**{**kept, "observations": observations, **options})
     except (ValueError, OSError) as error:
@@ -93,31 +89,34 @@ def replay_env(
     return env
 
 
+def required(run: RunRecord) -> Requirements:
+    """What a run's agent required, of what an agent may ask for.
+
+    Raises:
+        ReplayError: If the record says of it what this program does not know.
+    """
+    said = {"branchable": True, **run.requires}  # records do not say that
+    options = said.get("options")
+    if isinstance(options, Mapping):
+        said["options"] = {name: options[name] for name in SENSOR_OPTIONS if name in options}
+    try:
+        return Requirements.of_json(said)
+    except ValueError as error:
+        raise ReplayError(f"the record's {error}") from error
+
+
 def sensor_options(run: RunRecord) -> dict[str, Any]:
     """Arguments for `replay_env` that make it show what the agent saw, bit for bit.
 
     Raises:
         ReplayError: If the record says of a sensor what this program does not know.
     """
-    given: Mapping[str, Any] = {**run.requires.get("options", {}), **run.options}
-    options: dict[str, Any] = {"observations": tuple(run.requires["observations"])}
+    asked = required(run)
     try:
-        if "cameras" in given:
-            options["cameras"] = _rig(given["cameras"])
-        if "lidar" in given:
-            lidar = given["lidar"]
-            options["lidar"] = lidar if isinstance(lidar, str) else LidarConfig(**lidar)
-    except (TypeError, KeyError) as error:
+        own = {name: run.options[name] for name in SENSOR_OPTIONS if name in run.options}
+        return {"observations": asked.observations, **asked.options, **sensors_of_json(own)}
+    except ValueError as error:
         raise ReplayError(f"the record's sensors cannot be made here: {error}") from error
-    return options
-
-
-def _rig(cameras: str | Mapping[str, Any]) -> str | Rig:
-    """A rig by its name, or of the values that a record keeps of one."""
-    if isinstance(cameras, str):
-        return cameras
-    each = tuple(CameraConfig(**camera) for camera in cameras["cameras"])
-    return Rig(**{**cameras, "cameras": each})
 
 
 def replay(

@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.base import Agent, Control, Observation
+from agents.faults import agents_code, describe
+from agents.generators import Generators, generators
 from agents.versions import agent_version
 from di_envs.route_env import RouteEnv
 from leaderboard.records.episode_hash import observation_check
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.recorded_agent import RetraceError, retrace_env, run_agent, run_eyes
 from leaderboard.replaying.replay import ReplayError, ReplayStep, replay
-from leaderboard.running.episode import close_agent, describe, extra_keys, plan_shown
+from leaderboard.running.episode import close_agent, extra_keys, plan_shown
 from wrappers.interventions.context import EditContext, context_of
 from wrappers.interventions.eyes import Eyes
 
@@ -92,7 +94,8 @@ def retrace(
     eyes, checks = run_eyes(run, record, env), _checks(record)
     driver = agent or run_agent(run, env)
     try:
-        yield from _decisions(run, record, driver, env, eyes, checks)
+        with generators() as drawn:
+            yield from _decisions(run, record, driver, env, eyes, checks, drawn)
     finally:
         if agent is None:
             close_agent(driver)
@@ -105,11 +108,13 @@ def _decisions(
     env: RouteEnv,
     eyes: Eyes,
     checks: NDArray[np.uint32],
+    drawn: Generators,
 ) -> Iterator[Decision]:
     controls, memory = record.control_array(), None
     dt_s = env.config.control_dt_s
     for step in replay(run, record, env=env):
         if step.decision == 0:
+            drawn.begin(record.world_seed)
             memory = _started(agent, env, record)
         control = controls[step.decision] if step.decision < len(controls) else None
         decision, eyes = looked(step, agent, eyes, memory, dt_s, control)
@@ -146,8 +151,11 @@ def looked(
 def _started(agent: Agent[Any], env: RouteEnv, record: RouteRecord) -> Any:
     """The memory with which the agent begins."""
     try:
-        return agent.start(plan_shown(agent.requires, env.plan), record.world_seed)
-    except (Exception, SystemExit) as error:
+        with agents_code():
+            return agent.start(plan_shown(agent.requires, env.plan), record.world_seed)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise RetraceError(f"the agent fails at the start: {describe(error)}") from error
 
 
@@ -182,8 +190,11 @@ def _decided(
 ) -> Any:
     """The memory after a decision that must be the recorded one."""
     try:
-        control, after = agent.act(seen, memory)
-    except (Exception, SystemExit) as error:
+        with agents_code():
+            control, after = agent.act(seen, memory)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise RetraceError(f"the agent fails at {step.time_s:g} s: {describe(error)}") from error
     if not np.array_equal(np.asarray(control, np.float32), recorded):
         raise RetraceError(

@@ -3,12 +3,15 @@
 A replay needs no policy and no sensors, so it takes seconds. It gives a record of its own; the
 claim stands if the two are equal to the bit in all that does not need the policy: what happened,
 when and where, the score, the trace, the hashes of rewards, events and states. What the agent saw
-is compared too when asked for, with its sensors. Nobody can check without the policy that it would
-give these controls; that it was driven as recorded, and earned what is claimed, can be.
+is compared too when asked for, with its sensors. The world is looked up in the files that it is
+made of, and in no cache; of a shipped suite in what is shipped here. Nobody can check without the
+policy that it would give these controls; that it was driven as recorded, and earned what is
+claimed, can be.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,6 +21,7 @@ from queue import SimpleQueue
 from di_envs.edits.text import EditError
 from di_envs.route_env import RouteEnv
 from di_envs.rules import rules_named
+from di_envs.suite_files import found_beside
 from leaderboard.records.footing import footing_differences, footing_here, footing_of
 from leaderboard.records.record import (
     AGENT_CRASHED,
@@ -26,11 +30,13 @@ from leaderboard.records.record import (
     RouteRecord,
     RunRecord,
 )
+from leaderboard.records.results import run_folder
 from leaderboard.replaying.claim_differences import claim_differences
 from leaderboard.replaying.file_problems import spelling_problems, table_problems
 from leaderboard.replaying.recorded_agent import run_eyes
 from leaderboard.replaying.recorded_edits import seen_texts
 from leaderboard.replaying.replay import ReplayError, logged, replay, replay_env, sensor_options
+from leaderboard.replaying.world_problems import world_problems
 from leaderboard.running.finished_route import route_record, shown_weather
 from leaderboard.running.jobs import Job, plan_jobs
 from leaderboard.running.log import EpisodeLog
@@ -102,8 +108,11 @@ def verify_run(
     Raises:
         ReplayError: If the run's environment cannot be made here.
     """
-    env = replay_env(run, **(sensor_options(run) if observations else {}))
+    run = dataclasses.replace(run, options=found_beside(run.options, run_folder(folder)))
+    sensors = sensor_options(run) if observations else {}
+    env = replay_env(run, cached=False, **sensors)  # a cache may have been written by anybody
     problems = (
+        *world_problems(run),
         *_plan_problems(run, env),
         *table_problems(run, folder),
         *spelling_problems(folder),

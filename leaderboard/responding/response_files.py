@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from di_envs.files.json_values import parsed
+from di_envs.files.plain_text import file_name
 from di_envs.files.whole import write_whole
 from leaderboard.responding.drive_responses import DriveResponses
 
@@ -28,7 +29,7 @@ class ResponseFileError(Exception):
 
 def responses_file(folder: Path, route_id: str, seed: int) -> Path:
     """Where the responses of a route and seed are kept."""
-    return folder / f"route-{route_id}-seed-{seed}.npz"
+    return folder / f"route-{file_name(route_id)}-seed-{seed}.npz"
 
 
 def write_responses(path: Path, drive: DriveResponses) -> None:

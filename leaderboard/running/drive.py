@@ -20,6 +20,7 @@ from di_envs.suites import choose_suite
 from di_envs.world.state import TICK_S
 from di_envs.world.world import Event
 from leaderboard.records.record import RouteRecord
+from leaderboard.running.agent_place import AgentPlace
 from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.work_bar import work_bar
 from leaderboard.running.driver import environment_options
@@ -35,6 +36,7 @@ from leaderboard.running.interventions import (
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.setting_up import made_agent
 from leaderboard.running.video import VideoWriter, open_video
+from leaderboard.running.wall_clock import Stopwatch
 from leaderboard.running.warm_up import warm_up
 from leaderboard.scoring.names import EVENT_NAMES
 
@@ -68,7 +70,9 @@ def drive(
         VideoError: If the video cannot be written.
     """
     with contextlib.ExitStack() as closing:
-        agent, requires = made_agent(spec.agent)
+        place = AgentPlace(spec, Stopwatch())
+        closing.callback(place.close)
+        agent, requires = made_agent(spec.agent, place)
         ready = closing.enter_context(_closed_unless_taken(agent))
         spec = _of_one_route(spec, route_id)
         env, edits = _environment(spec, requires, filmed=video is not None, camera=camera)

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
-from agents import load_agent
 from agents.base import Agent, Requirements
 from di_envs.route_env import RouteEnv
 from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord
+from leaderboard.running.agent_place import AgentPlace
 from leaderboard.running.episode import close_agent, drive_route
 from leaderboard.running.interventions import sort_interventions, texts_of
 from leaderboard.running.jobs import Job, RunSpec
@@ -27,10 +27,21 @@ class Driver:
         spec: RunSpec,
         requires: Requirements | None = None,
         watch: Stopwatch | None = None,
+        place: AgentPlace | None = None,
     ) -> None:
+        """Makes the environment.
+
+        Args:
+            spec: The run.
+            requires: What the agent requires; None makes one and asks it.
+            watch: Where it is marked what is being done.
+            place: Where agents are made; None for one of its own.
+        """
         self.spec, self._watch = spec, watch or Stopwatch()
         self._rules = rules_named(spec.rules)
-        self.requires = requires or agent_requirements(spec.agent)
+        self._place = place or AgentPlace(spec, self._watch)
+        self.requires = Requirements.agreed(requires or _asked(self._place))
+        self._place.agree(self.requires)
         self.env = RouteEnv(**environment_options(spec.options, self.requires))
         space: Any = self.env.observation_space
         self.interventions = sort_interventions(spec.interventions, space)
@@ -58,7 +69,7 @@ class Driver:
             self._watch.end_job()
 
     def _new_agent(self) -> Agent[Any]:
-        return self.interventions.agent(self.spec.agent)
+        return self.interventions.agent(self.spec.agent, self._place.make)
 
     def __enter__(self) -> Driver:
         return self
@@ -69,16 +80,15 @@ class Driver:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._place.close()
         self.env.close()
 
 
-def agent_requirements(spec: str) -> Requirements:
-    """What the agent of that spec requires; raises whatever making it raises."""
-    agent = load_agent(spec)
-    try:
-        return agent.requires
-    finally:
-        close_agent(agent)
+def _asked(place: AgentPlace) -> Requirements:
+    """What the agent requires; raises whatever making it raises."""
+    agent, requires = place.asked()
+    close_agent(agent)
+    return requires
 
 
 def environment_options(options: Mapping[str, Any], requires: Requirements) -> dict[str, Any]:

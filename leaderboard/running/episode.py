@@ -1,38 +1,39 @@
 """Drives one route with one agent and writes down what happened, whatever the agent does.
 
-An agent that raises, returns NaN or leaves the action space fails on this route, with the reason;
-what it had driven by then still counts, as in CARLA.
+An agent that raises whatever it likes, returns NaN or leaves the action space fails on this route,
+with the reason; what it had driven by then still counts, as in CARLA. Every route begins in the
+same folder and with random numbers of its own, whatever an agent did in the one before.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
+import os
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
-
 from agents.base import Agent, Requirements
+from agents.faults import AgentDiedError, agents_code, as_control, describe
+from agents.generators import Generators, generators
 from di_envs.rules import Rules
 from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import WorldView
 from leaderboard.records.record import (
     AGENT_CRASHED,
+    LOST,
     NOT_SET_UP,
     SENSORS_INVALID,
     SIMULATION_CRASHED,
+    WORKER_DIED,
     RouteRecord,
 )
 from leaderboard.running.finished_route import lost_record, route_record, shown_weather
 from leaderboard.running.jobs import Job
 from leaderboard.running.log import EpisodeLog
-
-_LOW, _HIGH = (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)
-_CONTROL_NAMES = ("throttle", "steer", "brake")
 
 
 class FaultError(Exception):
@@ -59,7 +60,7 @@ def drive_route(
         new_agent: Makes the agent.
         job: The route and the seed.
         rules: What the score goes by.
-        requires: What the agent requires, where that is known: some must be set up to find out.
+        requires: What the agent may have, as the run says; None takes the agent's word.
         interventions: What the environment's wrappers do to what the agent sees, for the record.
     """
     started_s = time.perf_counter()
@@ -70,11 +71,12 @@ def drive_route(
     log = EpisodeLog(env.unwrapped.view)
     status = reason = ""
     try:
-        _drive(env, new_agent, requires, observation, job, log)
+        with _same_beginning() as drawn:
+            _drive(env, new_agent, requires, observation, job, log, drawn)
     except FaultError as fault:
         status, reason = fault.status, fault.reason
-        if log.steps == 0 and status == SIMULATION_CRASHED:
-            return lost_record(job, reason)
+        if status == WORKER_DIED or (log.steps == 0 and status in LOST):
+            return dataclasses.replace(lost_record(job, reason), status=status)
     return route_record(
         env.unwrapped.view,
         job,
@@ -85,6 +87,17 @@ def drive_route(
         interventions=interventions,
         wall_s=time.perf_counter() - started_s,
     )
+
+
+@contextmanager
+def _same_beginning() -> Iterator[Generators]:
+    """Random numbers and the folder are an agent's within, and as they were afterwards."""
+    folder = os.getcwd()
+    try:
+        with generators() as drawn:
+            yield drawn
+    finally:
+        os.chdir(folder)
 
 
 def _reset(env: Any, job: Job) -> Mapping[str, Any]:
@@ -102,13 +115,14 @@ def _drive(
     observation: Mapping[str, Any],
     job: Job,
     log: EpisodeLog,
+    drawn: Generators,
 ) -> None:
     """Lets the agent drive until the environment says that the route is over."""
     view: WorldView = env.unwrapped.view
     log.hashes.add_observation(observation)
-    agent, memory = _start(new_agent, requires, view.plans[view.ego], job)
+    agent, memory = _start(new_agent, requires, view.plans[view.ego], job, drawn)
     try:
-        extras = extra_keys(agent.requires, view)
+        extras = extra_keys(requires or agent.requires, view)
         over = False
         while not over:
             seen = {**observation, **extras} if extras else observation
@@ -138,14 +152,26 @@ def _start(
     requires: Requirements | None,
     plan: RoutePlan,
     job: Job,
+    drawn: Generators,
 ) -> tuple[Agent[Any], Any]:
     try:
-        agent = new_agent()
-        return agent, agent.start(plan_shown(requires or agent.requires, plan), job.world_seed)
-    except SensorSuiteError as error:
-        raise FaultError(SENSORS_INVALID, str(error)) from error
-    except (Exception, SystemExit) as error:
-        raise FaultError(NOT_SET_UP, describe(error)) from error
+        with agents_code():
+            drawn.begin(0)
+            agent = new_agent()
+            shown = plan_shown(requires or agent.requires, plan)
+            drawn.begin(job.world_seed)
+            return agent, agent.start(shown, job.world_seed)
+    except BaseException as error:
+        raise _fault(error, NOT_SET_UP) from error
+
+
+def _fault(error: BaseException, status: str) -> BaseException:
+    """What the agent's code raised, as a fault with that status; Ctrl-C stays what it is."""
+    if isinstance(error, KeyboardInterrupt):
+        return error
+    if isinstance(error, SensorSuiteError):
+        return FaultError(SENSORS_INVALID, str(error))
+    return FaultError(WORKER_DIED if isinstance(error, AgentDiedError) else status, describe(error))
 
 
 def decide(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tuple[Any, Any]:
@@ -155,27 +181,14 @@ def decide(agent: Agent[Any], observation: Mapping[str, Any], memory: Any) -> tu
         FaultError: If its code fails, or its control is none.
     """
     try:
-        control, memory = agent.act(observation, memory)
-        control = np.asarray(control, dtype=np.float32)
-    except SensorSuiteError as error:
-        raise FaultError(SENSORS_INVALID, str(error)) from error
-    except (Exception, SystemExit) as error:
-        raise FaultError(AGENT_CRASHED, describe(error)) from error
-    wrong = _control_error(control)
+        with agents_code():
+            given, memory = agent.act(observation, memory)
+            control, wrong = as_control(given)
+    except BaseException as error:
+        raise _fault(error, AGENT_CRASHED) from error
     if wrong:
         raise FaultError(AGENT_CRASHED, wrong)
     return control, memory
-
-
-def _control_error(control: np.ndarray[Any, Any]) -> str:
-    """What is wrong with a control [throttle, steer, brake]; empty when nothing is."""
-    if control.shape != (3,):
-        return f"act returned a control of shape {control.shape}, expected (3,)"
-    for name, value, low, high in zip(_CONTROL_NAMES, control.tolist(), _LOW, _HIGH, strict=True):
-        if not low <= value <= high:
-            kind = "NaN" if math.isnan(value) else f"{value:g}, outside [{low:g}, {high:g}]"
-            return f"act returned {name} {kind}"
-    return ""
 
 
 def step(env: Any, control: Any) -> tuple[Mapping[str, Any], float, bool, Mapping[str, Any]]:
@@ -194,16 +207,9 @@ def step(env: Any, control: Any) -> tuple[Mapping[str, Any], float, bool, Mappin
 def close_agent(agent: Agent[Any]) -> None:
     """Closes the agent; one that cannot even close has driven all the same."""
     try:
-        agent.close()
-    except (Exception, SystemExit) as error:
+        with agents_code():
+            agent.close()
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         warnings.warn(f"the agent's close() failed: {describe(error)}", stacklevel=2)
-
-
-def describe(error: BaseException) -> str:
-    """An exception and the line that raised it, in one line."""
-    text = " ".join(str(error).split())
-    where, trace = "", error.__traceback__
-    while trace is not None:
-        where = f" at {trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
-        trace = trace.tb_next
-    return f"{type(error).__name__}: {text}{where}" if text else f"{type(error).__name__}{where}"

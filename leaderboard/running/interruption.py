@@ -1,7 +1,8 @@
 """Ctrl-C and SIGTERM ask a run to stop, so that it saves what it has; a second one ends it at once.
 
-A signal raises no exception, which could come between a route's end and its file: it is noted, and
-whoever works looks at `requested` now and then.
+The first signal raises no exception, which could come between a route's end and its file: it is
+noted, and whoever works looks at `requested` now and then. The second one ends a command's process.
+A process that called us from Python is not ours to end: its caller gets a `KeyboardInterrupt`.
 """
 
 from __future__ import annotations
@@ -22,12 +23,15 @@ _SHOW_CURSOR = "\x1b[?25h"  # a progress bar hides it
 class Interruption:
     """Whether the run was asked to stop."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, ends_process: bool = False) -> None:
         self.requested = False
+        self._ends_process = ends_process
 
     def handle(self, number: int, frame: FrameType | None) -> None:
         """A signal's handler."""
         if self.requested:
+            if not self._ends_process:
+                raise KeyboardInterrupt
             for child in multiprocessing.active_children():
                 child.kill()
             if sys.stderr.isatty():
@@ -37,16 +41,22 @@ class Interruption:
 
 
 @contextmanager
-def interruptible() -> Iterator[Interruption]:
+def interruptible(*, ends_process: bool = False) -> Iterator[Interruption]:
     """Within, signals ask for the run to stop; in the main thread, which alone gets them.
 
     Within another `interruptible` it is the same one: who asks a run to stop asks the study, too.
+
+    Args:
+        ends_process: Whether a second signal ends the process, which is a command's own.
+
+    Raises:
+        KeyboardInterrupt: At a second signal, if it is not.
     """
     outer = getattr(signal.getsignal(signal.SIGINT), "__self__", None)
     if isinstance(outer, Interruption):
         yield outer
         return
-    interruption = Interruption()
+    interruption = Interruption(ends_process=ends_process)
     if threading.current_thread() is not threading.main_thread():
         yield interruption
         return

@@ -8,7 +8,7 @@ read where it enters, on the command line or from a record; from there on edits 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,13 +86,17 @@ class Interventions:
         """
         return Eyes.of(self.space, self.editing())
 
-    def agent(self, spec: str) -> Agent[Any]:
+    def agent(self, spec: str, make: Callable[[], Agent[Any]] | None = None) -> Agent[Any]:
         """The agent of that name, edited inside.
+
+        Args:
+            spec: Its name.
+            make: Makes it; None makes it here.
 
         Raises:
             EditError: If it cannot be.
         """
-        agent = load_agent(spec)
+        agent = load_agent(spec) if make is None else make()
         try:
             return self.within(agent, spec)
         except EditError:

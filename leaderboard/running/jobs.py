@@ -24,12 +24,14 @@ class RunSpec:
         options: Environment options; what the agent requires is added to them.
         rules: Name of the scoring rules.
         interventions: What is edited of what the agent sees.
+        isolate: Whether an agent that is not ours drives in a process of its own.
     """
 
     agent: str
     options: Mapping[str, Any] = field(default_factory=dict)
     rules: str = "carla-1.0"
     interventions: tuple[ObservationEdit, ...] = ()
+    isolate: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,7 @@ class RunFacts:
     routes_hash: str
     versions: Mapping[str, str]
     cpu: str
+    world: Mapping[str, str] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 

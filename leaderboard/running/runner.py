@@ -18,11 +18,13 @@ from typing import Any
 
 from rich.console import Console
 
+from di_envs.suite_files import from_anywhere
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import add_route, prepare_folder, start_run
 from leaderboard.records.resuming import resumed
+from leaderboard.running.agent_place import drives_apart
 from leaderboard.running.displays.run import RunDisplay
 from leaderboard.running.interruption import interruptible
 from leaderboard.running.jobs import Job, RunSpec, plan_jobs
@@ -36,6 +38,7 @@ from leaderboard.running.messages import (
     Started,
     Warned,
 )
+from leaderboard.running.terminal import Terminal
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
 
 
@@ -78,7 +81,7 @@ def evaluate(
         ResultsError: If the folder cannot be written to, is in use, holds results that are not
             to be replaced, or results that this run cannot continue.
     """
-    console = console or Console(stderr=True)
+    console = console or Terminal(stderr=True)
     with folder_lock(folder), interruptible() as interruption:
         prepare_folder(
             folder,
@@ -185,22 +188,16 @@ def _lost_record(job: Job, status: str, reason: str) -> RouteRecord:
 
 def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -> RunRecord:
     """A run of which nothing is driven yet."""
-    requires = scene.requires
+    asked = scene.requires.as_json()
     return RunRecord(
         rules=spec.rules,
         agent=spec.agent,
         agent_version=scene.agent_version,
-        track=str(requires.track),
-        requires={
-            "observations": list(requires.observations),
-            "control_dt_s": requires.control_dt_s,
-            "privileged": requires.privileged,
-            "hd_map": requires.hd_map,
-            "options": _as_json(requires.options),
-        },
+        track=str(scene.requires.track),
+        requires={name: value for name, value in asked.items() if name != "branchable"},
         suite=suite.name,
         suite_version=suite.version,
-        options={name: _as_json(value) for name, value in spec.options.items()},
+        options={name: _as_json(value) for name, value in from_anywhere(spec.options).items()},
         town=scene.town,
         town_hash=scene.town_hash,
         routes_hash=scene.routes_hash,
@@ -209,6 +206,8 @@ def new_run(spec: RunSpec, jobs: Sequence[Job], suite: Suite, scene: RunFacts) -
         cpu=scene.cpu,
         planned=len(jobs),
         interventions=tuple(map(str, spec.interventions)),
+        world=scene.world,
+        isolated=drives_apart(spec, scene.requires),
         refused=dict(scene.refused),
         notes=scene.notes,
     )

@@ -5,13 +5,16 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from agents import AgentSpecError, load_agent
+from agents import AgentSpecError
 from agents.base import Agent, Requirements
+from agents.faults import agents_code, describe
 from agents.versions import agent_version
 from di_envs.numerics.kernels import cpu_capability
+from di_envs.suite_files import content_of, suite_of
 from leaderboard.records.versions import package_versions
+from leaderboard.running.agent_place import AgentPlace
 from leaderboard.running.driver import Driver
-from leaderboard.running.episode import close_agent, describe
+from leaderboard.running.episode import close_agent
 from leaderboard.running.finished_route import route_hash
 from leaderboard.running.interventions import check_interventions
 from leaderboard.running.jobs import Job, RunSpec, SetupError
@@ -32,11 +35,12 @@ def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None
         SetupError: If the agent cannot be made, or the environment refuses its options.
     """
     watch.mark(Doing.SETTING_UP)
+    place = AgentPlace(spec, watch)
     if requires is not None:
-        return _loaded(spec, watch, requires)
-    agent, requires = made_agent(spec.agent)
+        return _loaded(spec, watch, requires, place)
+    agent, requires = made_agent(spec.agent, place)
     try:
-        driver = _loaded(spec, watch, requires)
+        driver = _loaded(spec, watch, requires, place)
         watch.mark(Doing.SETTING_UP)
         check_interventions(driver.interventions, agent, spec.agent)
     except ValueError as error:
@@ -46,11 +50,11 @@ def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None
     return driver
 
 
-def _loaded(spec: RunSpec, watch: Stopwatch, requires: Requirements) -> Driver:
+def _loaded(spec: RunSpec, watch: Stopwatch, requires: Requirements, place: AgentPlace) -> Driver:
     """The driver, once its town is loaded and the first route begun."""
     watch.mark(Doing.LOADING)
     try:
-        driver = Driver(spec, requires, watch)
+        driver = Driver(spec, requires, watch, place)
         first = Job(index=0, route_id=driver.env.route_ids[0], seed=0)
         driver.env.reset(seed=first.world_seed, options={"route": first.route_id})
     except (ValueError, OSError, ImportError) as error:
@@ -58,22 +62,24 @@ def _loaded(spec: RunSpec, watch: Stopwatch, requires: Requirements) -> Driver:
     return driver
 
 
-def made_agent(spec: str) -> tuple[Agent[Any], Requirements]:
+def made_agent(spec: str, place: AgentPlace) -> tuple[Agent[Any], Requirements]:
     """The agent of that name, and what it requires.
 
+    Args:
+        spec: Its name, for the error.
+        place: Where it is made; as it is for whoever requires that.
+
     Raises:
-        SetupError: If it cannot be made.
+        SetupError: If it cannot be made, or asks for what is not for it to choose.
     """
     try:
-        agent = load_agent(spec)
-        try:
-            return agent, agent.requires
-        except BaseException:
-            close_agent(agent)
-            raise
+        with agents_code():
+            return place.asked()
+    except KeyboardInterrupt:
+        raise
     except AgentSpecError as error:
         raise SetupError(str(error)) from error
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise SetupError(f"agent '{spec}' cannot be made: {describe(error)}") from error
 
 
@@ -92,6 +98,7 @@ def run_facts(driver: Driver) -> RunFacts:
         routes_hash=routes.hexdigest(),
         versions=package_versions(driver.spec.agent),
         cpu=cpu_capability(),
+        world=content_of(suite_of(driver.spec.options)),
         refused=planned.refused,
         notes=(*planned.warnings, *planned.notes),
     )

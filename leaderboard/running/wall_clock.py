@@ -6,12 +6,15 @@ and kills, so a worker that hangs, even inside a library that holds Python's loc
 
 from __future__ import annotations
 
+import signal
 import time
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any
 
-CELLS = 3  # numbers that a stopwatch is made of
+CELLS = 4  # numbers that a stopwatch is made of
+# Asks a process to write down where in its code it is; 0 on systems without such signals
+WHERE_SIGNAL = int(getattr(signal, "SIGUSR1", 0))
 
 
 class Doing(IntEnum):
@@ -58,13 +61,15 @@ class Stopwatch:
     """What a worker is doing: written by the worker, read by its parent.
 
     Args:
-        cells: (3,) shared doubles: what is being done, since when, and since when the job runs
-            (0 for no job); in seconds of a clock that all processes of a machine share. None when
-            nobody else looks.
+        cells: (4,) shared doubles: what is being done, since when, and since when the job runs
+            (0 for no job), in seconds of a clock that all processes of a machine share; and in
+            which process the agent is (0 for the worker's own). None when nobody else looks.
+        place: Descriptor of the file into which who hangs writes where; None for none.
     """
 
-    def __init__(self, cells: Any = None) -> None:
+    def __init__(self, cells: Any = None, place: int | None = None) -> None:
         self._cells = [0.0] * CELLS if cells is None else cells
+        self.place = place
 
     def mark(self, doing: Doing) -> None:
         """From now on this is done."""
@@ -83,6 +88,15 @@ class Stopwatch:
         """The job is over, and the worker waits for another."""
         self.mark(Doing.WAITING)
         self._cells[2] = 0.0
+
+    @property
+    def agent_process(self) -> int:
+        """Id of the process that the agent drives in; 0 where it is the worker's own."""
+        return int(self._cells[3])
+
+    @agent_process.setter
+    def agent_process(self, process_id: int) -> None:
+        self._cells[3] = process_id
 
     @property
     def doing(self) -> Doing:

@@ -21,6 +21,7 @@ from leaderboard.records.footing import record_differences
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
 from leaderboard.records.resuming import resumed
+from leaderboard.replaying.recorded_edits import code_of_edits
 from leaderboard.running.compiling import compile_progress
 from leaderboard.running.displays.study import StudyDisplay
 from leaderboard.running.interruption import interruptible
@@ -28,6 +29,7 @@ from leaderboard.running.interventions import texts_of
 from leaderboard.running.jobs import RunSpec, plan_jobs
 from leaderboard.running.messages import RunFacts
 from leaderboard.running.runner import Existing, evaluate, new_run
+from leaderboard.running.terminal import Terminal
 from leaderboard.running.workers.local_engine import Engine, LocalEngine
 from leaderboard.studies import StudyError
 from leaderboard.studies.looking_ahead import look_ahead
@@ -89,7 +91,7 @@ def drive_study(
         SetupError: If the agent or an option is wrong.
         ResultsError: If the folder cannot be written to, or is in use.
     """
-    console = console or Console(stderr=True)
+    console = console or Terminal(stderr=True)
     with folder_lock(folder), interruptible() as interruption:
         earlier = _earlier(folder)
         with compile_progress(console):
@@ -108,6 +110,17 @@ def drive_study(
 def _earlier(folder: Path) -> Study | None:
     """What the folder holds of a study; None if nothing."""
     return read_study(folder) if (folder / STUDY_FILE).exists() else None
+
+
+def _ours(folder: Path, driven: DrivenRow, plan: StudyPlan) -> DrivenRow:
+    """A row that the folder holds; refused if going on with it would run code that it names."""
+    code = [] if driven.row in plan.rows else list(code_of_edits(driven.row.edit.split(";")))
+    if code:
+        raise StudyError(
+            f"{folder / STUDY_FILE}: row '{driven.row.name}' is an edit that is not ours, "
+            f"{', '.join(code)}, and nobody asked for it: choose another --output"
+        )
+    return driven
 
 
 class _Driving:
@@ -136,7 +149,7 @@ class _Driving:
                 )
         self._rows = {BASELINE: DrivenRow(row=BASELINE_ROW), NULL: DrivenRow(row=NULL_ROW)}
         for driven in earlier.rows if earlier else ():
-            self._rows.setdefault(driven.row.name, driven)
+            self._rows.setdefault(driven.row.name, _ours(folder, driven, plan))
         for row in plan.rows:
             self._rows[row.name] = DrivenRow(row=row, left_out=reasons[row.name])
         self._extra = dict(earlier.extra) if earlier else {}

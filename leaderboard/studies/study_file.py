@@ -17,6 +17,7 @@ from di_envs.files.json_values import (
     read_document,
     to_json,
 )
+from di_envs.files.plain_text import file_name
 from di_envs.files.whole import write_whole
 from leaderboard.studies import StudyError
 from leaderboard.studies.record import DrivenRow, Study, StudyDrive
@@ -118,6 +119,10 @@ class _Row:
 
     def driven(self, columns: tuple[str, ...], source: str, at: str) -> DrivenRow:
         """The row and its drives."""
+        if file_name(self.name) != self.name:
+            raise JsonError(
+                f"{source}: {at}.name: expected a name that a folder can have, got {self.name!r}"
+            )
         for number, values in enumerate(self.drives):
             if len(values) != len(columns):
                 raise JsonError(

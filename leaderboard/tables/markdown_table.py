@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from di_envs.files.plain_text import plain
+
 
 def markdown_table(
     head: Sequence[str], rows: Sequence[Sequence[str]], rule: Sequence[str] = ()
@@ -19,5 +21,5 @@ def markdown_table(
 
 
 def _line(cells: Sequence[str]) -> str:
-    plain = (cell.replace("|", "\\|").replace("\n", ", ") for cell in cells)
-    return "| " + " | ".join(plain) + " |"
+    shown = (plain(cell).replace("|", "\\|").replace("\n", ", ") for cell in cells)
+    return "| " + " | ".join(shown) + " |"

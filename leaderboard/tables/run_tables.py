@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from di_envs.rules import DI_1_0, Rules, rules_named
+from leaderboard.records.claim_text import claim_lines
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.rescoring import records_all, rescored
 from leaderboard.scoring.names import EVENT_NAMES, SCENARIO_NAMES
@@ -198,6 +199,7 @@ def _caption(run: RunRecord) -> str:
     lines = [
         f"{routes} routes of {run.town}, {driven_km:.1f} km driven; {doubt}.",
         "bound: DS of a perfect driver on empty roads with the same lights, under the timeout.",
+        *claim_lines(run),
     ]
     if not records_all(run, DI_1_0):
         lines.append(f"DS under {DI_1_0.name} is not known: this run's world did not record it.")

@@ -20,6 +20,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from leaderboard.running.terminal import Terminal
+
 LOOK_BACK_S = 300.0  # work goes in bursts: a rate over half a minute, rich's own, jumps about
 EACH = "{task.fields[what]:<9}"  # for `what`: each task says it, as `add_task("", what="driving")`
 
@@ -49,7 +51,7 @@ def work_bar(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.description}"),
-        console=console or Console(stderr=True),
+        console=console or Terminal(stderr=True),
         speed_estimate_period=look_back_s,
         transient=transient,
     )

@@ -147,7 +147,7 @@ def check_footing(first: RunFacts, other: RunFacts) -> None:
     Raises:
         SetupError: If its CPU, versions, map, routes or agent are not those of the first worker.
     """
-    fields = ("cpu", "versions", "town_hash", "routes_hash", "agent_version")
+    fields = ("cpu", "versions", "town_hash", "routes_hash", "world", "agent_version")
     if found := record_differences(first, other, fields):
         said = "; ".join(difference.is_not for difference in found)
         raise SetupError(

@@ -7,7 +7,6 @@ child, see `agents.processes`.
 from __future__ import annotations
 
 import faulthandler
-import signal
 import threading
 import warnings
 from collections.abc import Callable
@@ -17,9 +16,7 @@ from typing import Any
 
 from agents.processes import live_for_parent
 from leaderboard.running.jobs import Job, RunSpec, SetupError
-from leaderboard.running.wall_clock import Doing, Stopwatch
-
-WHERE_SIGNAL = signal.SIGUSR1  # asks a worker to write down where it is
+from leaderboard.running.wall_clock import WHERE_SIGNAL, Doing, Stopwatch
 
 
 def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> None:
@@ -37,7 +34,7 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
         where.unlink()  # the parent has it open: nothing is left behind, whatever happens
         faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
         live_for_parent()
-        watch = Stopwatch(cells)
+        watch = Stopwatch(cells, place=place.fileno())
         try:
             _work(connection, watch, spec)
         except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -5,19 +5,18 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import signal
 import tempfile
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from agents.base import Requirements
-from agents.processes import FRESH, ctrl_c_blocked
+from agents.processes import FRESH, ctrl_c_blocked, how_it_ended
 from leaderboard.records.record import OUT_OF_TIME, WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.messages import Died, WorkerMessage
-from leaderboard.running.wall_clock import CELLS, Doing, Limits, Stopwatch
-from leaderboard.running.workers.worker import WHERE_SIGNAL, serve
+from leaderboard.running.wall_clock import CELLS, WHERE_SIGNAL, Doing, Limits, Stopwatch
+from leaderboard.running.workers.worker import serve
 
 _WHERE_S = 1.0  # for a hanging worker to write down where it is
 _FRAME = re.compile(r'File "(.+)", line (\d+) in (\S+)')
@@ -83,11 +82,13 @@ class WorkerProcess:
             self._process.kill()
         self._process.join()
         self._dead = True
-        return Died(status=status, reason=reason or f"the worker {_death(self._process.exitcode)}")
+        return Died(
+            status=status, reason=reason or f"the worker {how_it_ended(self._process.exitcode)}"
+        )
 
     def _whereabouts(self) -> str:
         """Where in the code it hangs, as it says itself; Python need not run for that."""
-        pid = self._process.pid
+        pid = self._watch.agent_process or self._process.pid
         assert pid is not None
         with contextlib.suppress(OSError):
             os.kill(pid, WHERE_SIGNAL)
@@ -108,9 +109,3 @@ class WorkerProcess:
         self.connection.close()
         self._where.close()
         Path(self._where.name).unlink(missing_ok=True)
-
-
-def _death(exitcode: int | None) -> str:
-    if exitcode is not None and exitcode < 0:
-        return f"was killed by {signal.Signals(-exitcode).name}"
-    return f"ended by itself with exit code {exitcode}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import textwrap
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -152,12 +153,16 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
     """
     spec = written(tmp_path, own)
     assert load_agent(spec).requires.track is Track.MAP
-    with Driver(RunSpec(agent=spec, options=QUIET)) as driver:
+    apart = RunSpec(agent=spec, options=QUIET)
+    with Driver(replace(apart, isolate=False)) as driver:
         record = driver.drive(Job(index=0, route_id="1", seed=0))
         town = driver.env.view.town
         calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
     assert calls[-2] == town.opendrive  # the last call is destroy()
+    with Driver(apart) as driver:
+        again = driver.drive(Job(index=0, route_id="1", seed=0))
+    assert again.fingerprint() == record.fingerprint()
 
 
 def test_hidden_generators_begin_anew_with_each_route(tmp_path):

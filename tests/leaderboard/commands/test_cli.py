@@ -131,7 +131,7 @@ def test_ctrl_c_keeps_what_is_finished_and_shows_it(tmp_path):
     """In a process of its own, as only there a signal does what it does to a user."""
     command = [sys.executable, "-m", "leaderboard", "evaluate"]
     command += ["--agent", f"{MISBEHAVING}:InterruptsTheRun", *QUIET]
-    command += ["--seeds", "4", "--output", str(tmp_path / "run")]
+    command += ["--no-isolate", "--seeds", "4", "--output", str(tmp_path / "run")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == EXIT_INTERRUPTED, done.stderr
     assert "interrupted: 2 of 4 routes are kept" in done.stderr

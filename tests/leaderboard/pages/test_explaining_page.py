@@ -49,7 +49,7 @@ def test_the_policy_of_another_make_is_explained_and_its_drives_too(capsys):
     exec(OWN, {})
     assert "'obstacles': [" in capsys.readouterr().out
     write_run(Path("results/mine"), short_run("mine.py:Mine", 6, traffic=0, walkers=0))
-    assert main(["respond", "results/mine", "--routes", "all"]) == 0
+    assert main(["respond", "results/mine", "--routes", "all", "--agent", "mine.py:Mine"]) == 0
     shown = capsys.readouterr().out
     assert "routing" in shown
     assert "Next: driveinsight respond results/mine --route ID" in shown

@@ -15,11 +15,24 @@ from leaderboard.running.interruption import SIGNALS, interruptible
 TWICE = """
 import os, signal
 from leaderboard.running.interruption import interruptible
-with interruptible() as interruption:
+with interruptible(ends_process=True) as interruption:
     os.kill(os.getpid(), signal.SIGTERM)
     print(interruption.requested, flush=True)
     os.kill(os.getpid(), signal.SIGINT)
     print("never")
+"""
+
+
+FROM_PYTHON = """
+import os, signal
+from leaderboard.running.interruption import interruptible
+try:
+    with interruptible():
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        print("never")
+except KeyboardInterrupt:
+    print("the host lives", flush=True)
 """
 
 
@@ -36,6 +49,11 @@ def test_a_signal_is_noted_and_handlers_are_put_back(number):
 def test_a_second_signal_ends_the_process():
     done = subprocess.run([sys.executable, "-c", TWICE], capture_output=True, check=False)
     assert (done.returncode, done.stdout) == (128 + signal.SIGINT, b"True\n")
+
+
+def test_a_second_signal_leaves_a_process_that_called_us_alive():
+    done = subprocess.run([sys.executable, "-c", FROM_PYTHON], capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (0, b"the host lives\n")
 
 
 def test_in_another_thread_nothing_is_touched():

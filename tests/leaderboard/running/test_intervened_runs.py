@@ -195,7 +195,7 @@ def test_edits_are_checked_against_the_agent_that_says_what_it_requires(monkeypa
 
     monkeypatch.setattr(agents, "_make", counted)
     with pytest.raises(SetupError, match="no taps that could be edited"):
-        set_up(spec("mask:bev,p=0.3"), Stopwatch())
+        set_up(dataclasses.replace(spec("mask:bev,p=0.3"), isolate=False), Stopwatch())
     assert made == [AGENT]
 
 

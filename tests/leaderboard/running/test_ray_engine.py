@@ -63,7 +63,7 @@ def evaluated(spec: RunSpec, seeds: list[int], folder: Path, said: io.StringIO) 
 def test_the_bits_are_those_of_this_process_though_an_actor_dies(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(MISBEHAVING, "mine.py")  # named as in this folder, it is found from any other
-    spec = RunSpec(agent="mine.py:KillsItsParentThenItself", options=OPTIONS)
+    spec = RunSpec(agent="mine.py:KillsItsParentThenItself", options=OPTIONS, isolate=False)
     said = io.StringIO()
     run = evaluated(spec, [0, 1, 2, 3], tmp_path / "run", said)
     assert f"route {ROUTE}, seed 2: Failed - Worker died, tried again: the Ray " in said.getvalue()

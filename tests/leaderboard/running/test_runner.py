@@ -41,8 +41,8 @@ BUSY = {"suite": "toy", "traffic": 8, "walkers": 4, "route_ids": (ROUTE, OTHER_R
 SHORT = Limits(step_s=2.0, setup_s=60.0)
 
 
-def misbehaving(name: str) -> RunSpec:
-    return RunSpec(agent=f"{MISBEHAVING}:{name}", options=QUIET)
+def misbehaving(name: str, *, isolate: bool = True) -> RunSpec:
+    return RunSpec(agent=f"{MISBEHAVING}:{name}", options=QUIET, isolate=isolate)
 
 
 def driven(spec: RunSpec, seeds: Sequence[int] = (0,)) -> list[RouteRecord]:
@@ -126,8 +126,8 @@ def test_an_agent_that_cannot_even_close_keeps_its_score_and_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("agent", "status", "reason"),
     [
-        ("EndsItsProcess", WORKER_DIED, "the worker ended by itself with exit code 7"),
-        ("Segfaults", WORKER_DIED, "the worker was killed by SIGSEGV"),
+        ("EndsItsProcess", WORKER_DIED, "the agent's process ended by itself with exit code 7"),
+        ("Segfaults", WORKER_DIED, "the agent's process was killed by SIGSEGV"),
         ("Sleeps", OUT_OF_TIME, "a step of the agent took more than 2 s (in misbehave at "),
         ("SleepsWithPythonsLock", OUT_OF_TIME, "a step of the agent took more than 2 s"),
     ],
@@ -164,7 +164,7 @@ def test_an_agent_that_never_starts_or_never_ends_is_stopped(agent, limits, reas
 def test_a_worker_that_is_always_killed_loses_its_own_route_and_no_other(tmp_path):
     run = evaluated(misbehaving("KillsItsWorker"), [1, 2, 3], tmp_path)
     assert [record.lost for record in run.routes] == [False, True, False]
-    assert run.routes[1].reason == "the worker was killed by SIGKILL"
+    assert run.routes[1].reason == "the agent's process was killed by SIGKILL"
     assert json.loads((tmp_path / CARLA_FILE).read_text())["eligible"] is False
 
 
@@ -182,7 +182,8 @@ def test_a_worker_killed_once_costs_nothing(tmp_path):
     [("InterruptsTheRun", 1), ("InterruptsTheRun", 2), ("TerminatesTheRun", 2)],
 )
 def test_what_was_finished_before_an_interruption_is_kept(agent, workers, tmp_path):
-    run = evaluated(misbehaving(agent), [0, 1, 3, 2], tmp_path, workers=workers)
+    spec = misbehaving(agent, isolate=False)  # there it knows who runs the run
+    run = evaluated(spec, [0, 1, 3, 2], tmp_path, workers=workers)
     kept = {record.seed for record in run.routes}
     assert kept <= {0, 1, 3}
     assert len(kept) >= 4 - workers  # beside the one that interrupts, each other worker's own
@@ -217,7 +218,10 @@ def test_events_carry_time_and_place():
         (RunSpec(agent="exprt", options=QUIET), "did you mean 'expert'"),
         (misbehaving("Nobody"), "no class 'Nobody'"),
         (misbehaving("RaisesWhenMade"), "cannot be made: OSError: no weights at "),
-        (misbehaving("EndsItsProcessWhenMade"), "cannot be set up: the worker ended by itself"),
+        (
+            misbehaving("EndsItsProcessWhenMade"),
+            "cannot be made: the agent's process ended by itself with exit code 7",
+        ),
         (misbehaving("SleepsWhenMade"), r"setting up the agent took more than 10 s \(in __init__"),
         (RunSpec(agent="constant", options={**QUIET, "route_ids": ("nowhere",)}), "nowhere"),
     ],

@@ -1,0 +1,48 @@
+"""Whose code an agent is: ours, which is shipped and told by its version, or that of others.
+
+Code of others drives in a process of its own, and runs from a results folder only if somebody says
+that it may. Nothing here imports what it names.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+from agents import AGENTS, SCHEMES
+
+# Of the schemes, the one whose files are numbers and text: a policy of ours
+_DATA_ONLY = "driveinsight"
+_OURS = {*AGENTS, *(entry.entry_point for entry in AGENTS.values())}
+
+
+def code_of_others(spec: str) -> str:
+    """What code that is not ours an agent's specification runs, in a few words; empty if none."""
+    scheme, _, place = spec.partition(":")
+    if spec in _OURS or not place or scheme == _DATA_ONLY:
+        return ""
+    if scheme == "sb3":
+        return f"the pickles in {_file_of(place)}"
+    if scheme in SCHEMES:
+        return f"the file {_file_of(place)}"
+    return code_at(spec.rpartition(":")[0])
+
+
+def code_at(place: str) -> str:
+    """A module's name or a Python file as a person can find it: with its path, where there is one.
+
+    Args:
+        place: `package.module`, or `path/to/file.py`.
+    """
+    if place.endswith(".py"):
+        return f"the file {Path(place).absolute()}"
+    try:
+        found = importlib.util.find_spec(place.partition(".")[0])  # of a package: not imported
+    except (ImportError, ValueError):
+        found = None
+    where = f" ({found.origin})" if found is not None and found.origin else ""
+    return f"the module {place}{where}"
+
+
+def _file_of(place: str) -> Path:
+    return Path(place.partition("?")[0]).absolute()
