@@ -10,15 +10,15 @@ import argparse
 import math
 from pathlib import Path
 
-from di_envs.rules import rules_named
+from di_envs.rules import DI_1_0, rules_named
 from leaderboard.records.record import RunRecord
 from leaderboard.records.results import ResultsError, read_run
 from leaderboard.statistics.confidence import mean_interval
-from leaderboard.tables.run_tables import driving_interval, mean_bound, seed_means
+from leaderboard.tables.run_tables import by_our_rules, driving_interval, mean_bound, seed_means
 
 HEADER = (
-    "| agent | track | suite | DS | RC | IS | bound | infractions a km |",
-    "|---|---|---|---:|---:|---:|---:|---:|",
+    "| agent | track | suite | DS | DS `di-1.0` | RC | IS | bound | infractions a km |",
+    "|---|---|---|---:|---:|---:|---:|---:|---:|",
 )
 
 
@@ -30,11 +30,13 @@ def row(run: RunRecord) -> str:
     completion = mean_interval(seed_means(run.routes, "route_completion", run.seeds))
     penalty = mean_interval(seed_means(run.routes, "infraction_score", run.seeds))
     bound = mean_bound(run.routes)
+    ours = run if run.rules == DI_1_0.name else by_our_rules(run)
     cells = [
         f"`{run.agent}`",
         run.track,
         f"`{run.suite}`" + ("" if run.complete else " (not complete)"),
         str(driving_interval(run)),
+        "-" if ours is None else str(driving_interval(ours)),
         str(completion),
         f"{penalty.mean:.2f}",
         "-" if bound is None else f"{bound:.1f}",

@@ -43,7 +43,7 @@ def print_run(run: RunRecord, console: Console) -> None:
 
 
 def _route_table(run: RunRecord) -> Table:
-    ours = _by_our_rules(run)
+    ours = by_our_rules(run)
     title = f"{escape(run.title)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
     table = Table(title=title, title_justify="left", title_style="bold")
     table.add_column("route")
@@ -71,7 +71,7 @@ def _briefly(reason: str) -> str:
     return reason.partition("; ")[0].partition(". ")[0]
 
 
-def _by_our_rules(run: RunRecord) -> RunRecord | None:
+def by_our_rules(run: RunRecord) -> RunRecord | None:
     """The run as `di-1.0` scores it; None where it is so already, or was recorded too early."""
     if run.rules == DI_1_0.name or not records_all(run, DI_1_0):
         return None
