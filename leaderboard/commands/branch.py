@@ -57,7 +57,8 @@ class Branch:
         from di_envs.edits.text import EditError
         from di_envs.edits.world import read_world_edits
         from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
-        from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
+        from leaderboard.records.own_files import prepare_folder, take_away
+        from leaderboard.records.results import ResultsError, read_run, write_run
 
         try:
             edits = read_world_edits(self.world)
@@ -81,6 +82,7 @@ class Branch:
                     bar.update(task, completed=int(time_s))
 
                 futures = branch(run, record, self.at, edits, on_step=show)
+            take_away(folder)
             write_run(folder, branch_run(run, futures))
             picture = folder / "branch.png"
             write_branch_picture(picture, run, futures)

@@ -77,6 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for a wrong request; 130 if interrupted.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    if empty := _empty(given):
+        complain(empty)
+        return EXIT_USAGE
     commands: Any = Command if given and not given[0].startswith("-") else _briefly(Command)
     command: Command = tyro.cli(commands, prog="driveinsight", description=HELP, args=given)
     try:
@@ -88,6 +91,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UsageError as error:
         complain(str(error))
         return EXIT_USAGE
+
+
+def _empty(given: Sequence[str]) -> str:
+    """What to say of an empty argument, which as a path would be the current folder."""
+    for place, argument in enumerate(given):
+        option = argument.removesuffix("=") if argument.startswith("--") else given[place - 1]
+        if argument == "" or (argument.startswith("--") and argument.endswith("=")):
+            after = f" after {option}" if option.startswith("-") else ""
+            return (
+                f"an argument{after} is empty, as of a shell variable that is not set: give a value"
+                ", or leave it out"
+            )
+    return ""
 
 
 def _briefly(commands: Any) -> Any:

@@ -70,6 +70,7 @@ class Evaluate(EngineArguments, SceneArguments):
         spec = RunSpec(
             agent=self.agent, options=options, rules=self.rules, interventions=self.edits()
         )
+        new = not folder.exists()
         try:
             run = evaluate(
                 spec,
@@ -82,7 +83,8 @@ class Evaluate(EngineArguments, SceneArguments):
         except (SetupError, ResultsError) as error:
             raise UsageError(str(error)) from error
         finally:
-            _remove_if_empty(folder)
+            if new:
+                _remove_if_empty(folder)
         _print_run(run, folder)
         if not run.complete:
             return EXIT_INTERRUPTED

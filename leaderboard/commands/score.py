@@ -37,8 +37,9 @@ class ScoreByRules:
     def run(self) -> int:
         """Scores; returns the exit code."""
         from di_envs.rules import rules_named
+        from leaderboard.records.own_files import prepare_folder
         from leaderboard.records.rescoring import rescored
-        from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
+        from leaderboard.records.results import ResultsError, read_run, write_run
         from leaderboard.tables.rescoring_table import rescoring_table
 
         try:
