@@ -1,8 +1,7 @@
 """The seven towns that policies are trained in; Town05 is not among them, nor anything like it.
 
 Their styles are those of CARLA's other towns. Maps, routes and triggers are made when they are
-first wanted, kept in the user's cache folder, and the same everywhere: all draws are keyed
-by the town's name.
+first wanted, kept in our caches, and the same everywhere: all draws are keyed by the town's name.
 """
 
 from __future__ import annotations
@@ -16,10 +15,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from platformdirs import user_cache_path
-
 from agents.training.street_grids import TownStyle, street_tables
 from di_envs.config import check_name
+from di_envs.files.caches import ASKED, cache_folders, writable_cache
 from di_envs.files.whole import whole_folder
 from di_envs.town.building.junction_layout import town_text
 from di_envs.town.building.routes import random_way
@@ -167,14 +165,20 @@ def town_files(name: str) -> TownFiles:
 
     Raises:
         ValueError: If there is no such town; suggests the nearest.
+        OSError: If it cannot be written.
     """
     check_name(name, TRAINING_TOWNS, "training town")
-    folder = user_cache_path("driveinsight") / "training" / f"{name}-{_recipe_hash(name)}"
-    files = TownFiles(name=name, folder=folder)
-    if not files.scenarios.is_file():
-        with whole_folder(folder) as made:
-            _make(TownFiles(name=name, folder=made))
-    return files
+    this = f"{name}-{_recipe_hash(name)}"
+    for place in cache_folders("training"):
+        files = TownFiles(name=name, folder=place / this)
+        if files.scenarios.is_file():
+            return files
+    kept = writable_cache("training")
+    if kept is None:
+        raise OSError(f"there is no folder to make the town '{name}' in: name one in {ASKED}")
+    with whole_folder(kept / this) as made:
+        _make(TownFiles(name=name, folder=made))
+    return TownFiles(name=name, folder=kept / this)
 
 
 def _map(name: str) -> str:

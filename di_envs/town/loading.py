@@ -49,7 +49,7 @@ def load_town(
             (`di_envs.town.reading.sidecar` has its format). "synthesise": a guess from the
             junctions' shapes (`di_envs.town.reading.guessing`); a warning says what it made.
             "none": there are none.
-        cache_folder: Where parsed towns are kept; by default the user's cache folder.
+        cache_folder: Where parsed towns are kept; by default in our caches.
 
     Raises:
         FileNotFoundError: If there is no such file, shipped town or sidecar.
@@ -60,12 +60,11 @@ def load_town(
     content = path.read_bytes()
     told = sidecar.read_bytes() if sidecar is not None else b""
     key = cache.content_hash(content, source.encode() + b"\0" + told)
-    folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
     text = decode_xml(content, str(path))
-    loaded = cache.load_cached(key, path.stem, text, folder)
+    loaded = cache.load_cached(key, path.stem, text, cache_folder)
     if loaded is None:
         loaded = cache.freeze(_parse(path, text, source, sidecar, key))
-        cache.store(loaded, folder)
+        cache.store(loaded, cache_folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
     if source == SYNTHESISE:

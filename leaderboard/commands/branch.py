@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
+from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.running.displays.work_bar import work_bar
 
@@ -93,7 +93,7 @@ class Branch:
             say("Both futures are the same, to the bit.")
         say(
             f"Written: {picture} and the edited drive beside it.",
-            f"Next: driveinsight verify {folder}",
+            f"Next: driveinsight verify {typed(folder)}",
         )
         return EXIT_CRASHED if futures.edited.lost else 0
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rich.console import Console
 from rich.table import Table
 
-from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class Collect:
             return EXIT_INTERRUPTED
         say(
             f"Written: {self.output / CARD_FILE} and a file for each drive beside it.",
-            f"Next: driveinsight train --config small --data {self.output}",
+            f"Next: driveinsight train --config small --data {typed(self.output)}",
         )
         return 0
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 
 COMPARE_HELP = """Pair two runs by route and seed: what changed in the second, how surely, and why.
@@ -51,5 +51,5 @@ class Compare:
         except (ResultsError, PairingError, ValueError) as error:
             raise UsageError(str(error)) from error
         Console().print(comparison_tables(comparison))
-        say(f"Next: driveinsight verify {self.second}")
+        say(f"Next: driveinsight verify {typed(self.second)}")
         return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from rich.console import Console
 
-from leaderboard.commands.ending import say
+from leaderboard.commands.ending import say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.study_arguments import StudyArguments, run_study
 
@@ -83,6 +83,5 @@ class _WhatHolds:
         written = write_prompt_editing(folder, study)
         Console().print(prompt_editing_tables(study))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
-        return [
-            f"Next: driveinsight verify {folder / 'rows' / 'baseline'}       does the claim stand?"
-        ]
+        baseline = typed(folder / "rows" / "baseline")
+        return [f"Next: driveinsight verify {baseline}       does the claim stand?"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 from rich.console import Console
 
-from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
 
@@ -131,10 +131,11 @@ def _print_run(run: RunRecord, folder: Path) -> None:
 
 def _next_steps(run: RunRecord, folder: Path) -> list[str]:
     """Commands that make sense now."""
+    where = typed(folder)
     if run.lost or not run.complete:
-        return [f"Next: the same command with --output {folder} --resume drives what is missing"]
+        return [f"Next: the same command with --output {where} --resume drives what is missing"]
     return [
-        f"Next: driveinsight show {folder}",
-        f"      driveinsight verify {folder}       does the claim stand?",
-        f"      driveinsight compare {folder} OTHER",
+        f"Next: driveinsight show {where}",
+        f"      driveinsight verify {where}       does the claim stand?",
+        f"      driveinsight compare {where} OTHER",
     ]

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 
 SCORE_HELP = """Score a finished run by other rules, without driving, beside its own.
@@ -56,5 +56,5 @@ class ScoreByRules:
         if self.output is None:
             say("Nothing was written: pass --output DIR to keep the run under these rules.")
         else:
-            say(f"Written: {self.output}", f"Next: driveinsight show {self.output}")
+            say(f"Written: {self.output}", f"Next: driveinsight show {typed(self.output)}")
         return 0

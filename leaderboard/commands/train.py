@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.console import Console
 
-from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 
 if TYPE_CHECKING:
@@ -200,7 +200,8 @@ def _tell_trained(session: Session) -> None:
         best = max(checked, key=lambda row: row["driving_score"])
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
     policy = folder / POLICY_FOLDER
+    agent = typed(f"driveinsight:{policy}")
     say(
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
-        f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny",
+        f"Next: driveinsight evaluate --agent {agent} --suite town05_tiny",
     )
