@@ -28,6 +28,9 @@ from typing import Any, Protocol, TypeVar
 from di_envs.files.caches import CacheWarning
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
+_FROM_TERMINAL = tuple(  # Windows has no SIGQUIT
+    getattr(signal, name) for name in ("SIGINT", "SIGQUIT") if hasattr(signal, name)
+)
 FRESH = multiprocessing.get_context("spawn")  # how they begin: with nothing of their parent's
 
 J = TypeVar("J")
@@ -132,7 +135,7 @@ def ctrl_c_blocked() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGQUIT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FROM_TERMINAL)
     try:
         yield
     finally:
@@ -159,9 +162,8 @@ def leave_warnings_to_parent() -> None:
 
 def live_for_parent() -> None:
     """In a child: leaves Ctrl-C to the parent, and has the child end when the parent does."""
-    for name in ("SIGINT", "SIGQUIT"):
-        if hasattr(signal, name):  # Windows has no SIGQUIT
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for number in _FROM_TERMINAL:
+        signal.signal(number, signal.SIG_IGN)
     leave_warnings_to_parent()
     end_with_parent()
     parent = multiprocessing.parent_process()

@@ -34,9 +34,9 @@ def check_not_shadowed(top: Path, names: tuple[str, ...] = SHADOWED_NAMES) -> No
             raise ImportError(
                 f"`{name}` is DriveInsight's package at {ours}, but another one comes first: "
                 f"{found[0]} (CARLA's Python API and openai-agents have packages of that name). "
-                f"Put {top} before {found[0].parent}: PYTHONPATH={shlex.quote(str(top))}:$PYTHONPATH "
-                "driveinsight …, and not `python -m` in that folder, where it comes before all; or "
-                "remove the other package",
+                f"Put {top} before {found[0].parent}: "
+                f"PYTHONPATH={shlex.quote(str(top))}:$PYTHONPATH driveinsight …, and not `python "
+                "-m` in that folder, where it comes before all; or remove the other package",
                 name=name,
                 path=str(found[0]),
             )

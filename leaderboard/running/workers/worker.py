@@ -11,6 +11,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from agents.processes import live_for_parent
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.wall_clock import Doing, Stopwatch
 
-WHERE_SIGNAL = signal.SIGUSR1  # asks a worker to write down where it is
+# Asks a worker to write down where it is; Windows has none that could
+WHERE_SIGNAL = getattr(signal, "SIGUSR1", None)
 
 
 def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> None:
@@ -34,8 +36,10 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
     """
     faulthandler.enable()  # a crash inside a library says on stderr which line led to it
     with open(where, "w", encoding="utf-8") as place:
-        where.unlink()  # the parent has it open: nothing is left behind, whatever happens
-        faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
+        with suppress(OSError):  # Windows removes no file that is open
+            where.unlink()  # the parent has it open: nothing is left behind, whatever happens
+        if WHERE_SIGNAL is not None:
+            faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
         live_for_parent()
         watch = Stopwatch(cells)
         try:
@@ -43,7 +47,8 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
         except (EOFError, BrokenPipeError, ConnectionResetError):
             pass  # the parent wants no more
         finally:
-            faulthandler.unregister(WHERE_SIGNAL)
+            if WHERE_SIGNAL is not None:
+                faulthandler.unregister(WHERE_SIGNAL)
 
 
 def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:

@@ -88,7 +88,8 @@ class WorkerProcess:
     def _whereabouts(self) -> str:
         """Where in the code it hangs, as it says itself; Python need not run for that."""
         pid = self._process.pid
-        assert pid is not None
+        if pid is None or WHERE_SIGNAL is None:
+            return ""
         with contextlib.suppress(OSError):
             os.kill(pid, WHERE_SIGNAL)
             until_s = time.monotonic() + _WHERE_S
