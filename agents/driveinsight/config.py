@@ -39,6 +39,22 @@ DROPOUT: Mapping[str, float] = MappingProxyType(
 )
 
 
+LARGEST = 4096  # of any number that sizes a network: more is a slip, and would take all memory
+
+
+def check_sizes(config: Any, *names: str) -> None:
+    """Refuses sizes of which no network is made.
+
+    Raises:
+        ValueError: Names the first that is not from 1 to `LARGEST`.
+    """
+    for name in names:
+        value = getattr(config, name)
+        for size in value if isinstance(value, tuple | list) else (value,):
+            if not 1 <= size <= LARGEST:
+                raise ValueError(f"{name} must be from 1 to {LARGEST}, not {size}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class GridConfig:
     """The space around the ego that features are gathered in, ego frame [m].
@@ -55,6 +71,7 @@ class GridConfig:
     cells: int = 48  # along x and along y
 
     def __post_init__(self) -> None:
+        check_sizes(self, "cells")
         for axis in "xyz":
             low, high = getattr(self, f"{axis}_min_m"), getattr(self, f"{axis}_max_m")
             if not low < high:
@@ -101,6 +118,7 @@ class CameraEncoderConfig:
 
     def __post_init__(self) -> None:
         rig_of(self.rig)
+        check_sizes(self, "depths", "width", "channels", "depth_bins")
         check_name(self.block, ("basic", "bottleneck"), "ResNet block")
         object.__setattr__(self, "depths", tuple(self.depths))
         if self.stride not in (4, 8, 16):
@@ -131,6 +149,12 @@ class LidarEncoderConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "widths", tuple(self.widths))
+        check_sizes(self, "widths", "channels")
+        if not self.widths:
+            raise ValueError("widths needs a level")
+        for name in ("voxel_m", "voxel_z_m"):
+            if getattr(self, name) < 0.05:
+                raise ValueError(f"{name} must be 0.05 or more, not {getattr(self, name):g}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,6 +180,9 @@ class PlannerConfig:
     dropout: Mapping[str, float] = field(default_factory=lambda: DROPOUT)
 
     def __post_init__(self) -> None:
+        check_sizes(self, "width", "heads", "layers", "bev_tokens", "waypoints")
+        if not self.waypoint_dt_s > 0.0:
+            raise ValueError(f"waypoint_dt_s must be positive, not {self.waypoint_dt_s:g}")
         if self.width % self.heads:
             raise ValueError(f"{self.heads} heads do not share a width of {self.width} evenly")
         object.__setattr__(self, "dropout", MappingProxyType(dict(self.dropout)))
@@ -193,8 +220,11 @@ class PolicyConfig:
         object.__setattr__(self, "prompt", tuple(self.prompt))
         for name in self.prompt:
             check_name(name, COMPONENTS, "prompt component")
-        if self.memory_frames < 0:
-            raise ValueError(f"memory_frames must be 0 or more, not {self.memory_frames}")
+        check_sizes(self, "bev_width")
+        if not 0 <= self.memory_frames <= LARGEST:
+            raise ValueError(f"memory_frames must be from 0 to {LARGEST}, not {self.memory_frames}")
+        if not self.memory_dt_s > 0.0:
+            raise ValueError(f"memory_dt_s must be positive, not {self.memory_dt_s:g}")
         if not self.sensors and not self.prompt:
             raise ValueError("a policy needs a camera, a LiDAR or a prompt component")
 

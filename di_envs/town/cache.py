@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from di_envs.files.caches import cache_folders, warn_not_kept, writable_cache
 from di_envs.files.json_values import from_json, parsed
+from di_envs.files.received import read_arrays
 from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.town.town import Town
@@ -54,6 +56,7 @@ class _About:
     """What a file holds beside arrays."""
 
     key: str
+    digest: str  # of the arrays
     road_names: tuple[str, ...]
     junction_names: tuple[str, ...]
     geo_origin: tuple[float, float]
@@ -99,16 +102,16 @@ def _loaded(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | N
     key = cache_key(town_hash)
     path = folder / f"{key}.npz"
     try:
-        # Opened here: np.load would leave a file open that turns out to be no archive.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = from_json(_About, parsed(str(stored["about"]), str(path)), str(path))
-            arrays = {
-                part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
-                for part, kind in _PARTS.items()
-            }
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        stored = read_arrays(path)
+        about = from_json(_About, parsed(str(stored.pop("about")), str(path)), str(path))
+        arrays = {
+            part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
+            for part, kind in _PARTS.items()
+        }
+    except (ValueError, KeyError):
         return None
-    if about.key != key:
+    # Kernels look up numbers in these arrays unchecked, so they must be those that were written
+    if about.key != key or about.digest != _digest(stored):
         return None
     return Town(
         name=name,
@@ -135,16 +138,17 @@ def store(town: Town, folder: Path | None = None) -> None:
     if place is None:
         return
     key = cache_key(town.content_hash)
-    about = {
-        "key": key,
-        "road_names": town.road_names,
-        "junction_names": town.junction_names,
-        "geo_origin": town.geo_origin,
-    }
     arrays = {
         f"{part}.{field}": value
         for part in _PARTS
         for field, value in getattr(town, part)._asdict().items()
+    }
+    about = {
+        "key": key,
+        "digest": _digest(arrays),
+        "road_names": town.road_names,
+        "junction_names": town.junction_names,
+        "geo_origin": town.geo_origin,
     }
     try:
         write_whole(
@@ -153,6 +157,15 @@ def store(town: Town, folder: Path | None = None) -> None:
         )
     except OSError as error:
         warn_not_kept(place, error)
+
+
+def _digest(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Names arrays with all that they hold."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode() + array.tobytes())
+    return digest.hexdigest()
 
 
 def freeze(town: Town) -> Town:

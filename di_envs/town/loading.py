@@ -6,6 +6,7 @@ import difflib
 import warnings
 from pathlib import Path
 
+from di_envs.files.received import read_bytes
 from di_envs.town import cache
 from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.crosswalks import find_crosswalks
@@ -57,8 +58,8 @@ def load_town(
     """
     path = _known_path(town, TOWNS, "OpenDRIVE file and no shipped town", ())
     source, sidecar = _signal_source(signals)
-    content = path.read_bytes()
-    told = sidecar.read_bytes() if sidecar is not None else b""
+    content = _content(path)
+    told = _content(sidecar) if sidecar is not None else b""
     key = cache.content_hash(content, source.encode() + b"\0" + told)
     text = decode_xml(content, str(path))
     loaded = cache.load_cached(key, path.stem, text, cache_folder)
@@ -70,6 +71,13 @@ def load_town(
     if source == SYNTHESISE:
         warnings.warn(_what_was_guessed(path, loaded), UserWarning, stacklevel=2)
     return loaded
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_bytes(path)
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror or error}") from error
 
 
 def _parse(path: Path, text: str, source: str, sidecar: Path | None, key: str) -> Town:
