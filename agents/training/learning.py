@@ -25,6 +25,7 @@ from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
 from agents.training.samples import Batch, hidden_components
 from di_envs.differences import differences
+from di_envs.files.received import check_ordinary
 from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 
@@ -78,6 +79,7 @@ class Training:
         """
         device = next(self.policy.parameters()).device
         try:
+            check_ordinary(path)
             content = torch.load(path, weights_only=True, map_location=device)
             policy, config = content["policy_config"], content["config"]
         except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError, IndexError,

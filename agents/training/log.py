@@ -55,8 +55,12 @@ def _table(path: Path) -> tuple[list[str], list[list[str]]]:
     """
     if not path.exists():
         return [], []
-    text = read_bytes(path).decode("utf-8", errors="replace")
-    names, *rows = list(csv.reader(io.StringIO(text, newline=""), strict=False)) or [[]]
+    try:
+        text = read_bytes(path).decode("utf-8", errors="replace")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    except (OSError, csv.Error) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise TrainingError(f"{path} is no log of a training ({why}): remove it") from error
     if not names:
         return [], []
     if "step" not in names:

@@ -35,15 +35,25 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     Raises:
         OSError: If it cannot be read, is no ordinary file, or is longer; `strerror` says which.
     """
+    size = check_ordinary(path)
+    if size > most:
+        said = f"is too large to be one of these: {size} B, more than {most}"
+        raise OSError(errno.EFBIG, said, str(path))
+    return path.read_bytes()
+
+
+def check_ordinary(path: Path) -> int:
+    """Makes sure that a file can be read to an end; returns how many bytes it has.
+
+    Raises:
+        OSError: As `read_bytes`.
+    """
     found = path.stat()
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder, not a file", str(path))
     if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "is no ordinary file, but a pipe or a device", str(path))
-    if found.st_size > most:
-        size = f"{found.st_size} B, more than {most}"
-        raise OSError(errno.EFBIG, f"is too large to be one of these: {size}", str(path))
-    return path.read_bytes()
+    return found.st_size
 
 
 def read_arrays(path: Path, most: int = MOST_UNPACKED) -> dict[str, NDArray[Any]]:
