@@ -123,7 +123,7 @@ COMMANDS = {
     ),
     "edit": Killed(
         words="edit --agent driveinsight:{given}/policy --suite toy --route-ids 0 --traffic 4 "
-        "--walkers 2 --experiments route speed --output {folder}",
+        "--walkers 2 --experiments speed --output {folder}",
         prepare=an_untrained_policy,
     ),
     "respond": Killed(
