@@ -1,9 +1,10 @@
 """Work in processes of this machine: fresh ones, that leave Ctrl-C to their parent and end with it.
 
 Whoever spreads work over processes does it here, so that one rule holds for all. A child is born
-with Ctrl-C blocked, and watches its parent: one that is killed, even by a signal that nobody can
-catch, leaves no child behind. This lies in `agents`, the lowest room that starts processes; the
-leaderboard's workers and pools use it from above.
+with Ctrl-C and Ctrl-\\ blocked, and ends with its parent: one that is killed, even by a signal that
+nobody can catch, leaves no child behind. On Linux the system sees to that, elsewhere a thread that
+watches a pipe. This lies in `agents`, the lowest room that starts processes; the leaderboard's
+workers and pools use it from above.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -23,7 +25,12 @@ from itertools import islice
 from multiprocessing.connection import wait
 from typing import Any, Protocol, TypeVar
 
+from di_envs.files.caches import CacheWarning
+
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
+_FROM_TERMINAL = tuple(  # Windows has no SIGQUIT
+    getattr(signal, name) for name in ("SIGINT", "SIGQUIT") if hasattr(signal, name)
+)
 FRESH = multiprocessing.get_context("spawn")  # how they begin: with nothing of their parent's
 
 J = TypeVar("J")
@@ -121,8 +128,14 @@ def _result(pending: Pending[R]) -> R:
 
 @contextmanager
 def ctrl_c_blocked() -> Iterator[None]:
-    """Processes born within never die of Ctrl-C, not even while they load."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Processes born within never die of Ctrl-C, or Ctrl-\\, not even while they load.
+
+    Windows has no such masks: there it does nothing.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FROM_TERMINAL)
     try:
         yield
     finally:
@@ -149,9 +162,17 @@ def how_it_ended(exitcode: int | None) -> str:
     return f"ended by itself with exit code {exitcode}"
 
 
+def leave_warnings_to_parent() -> None:
+    """In a child: says nothing of caches, which its parent has said already."""
+    warnings.filterwarnings("ignore", category=CacheWarning)
+
+
 def live_for_parent() -> None:
     """In a child: leaves Ctrl-C to the parent, and has the child end when the parent does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in _FROM_TERMINAL:
+        signal.signal(number, signal.SIG_IGN)
+    leave_warnings_to_parent()
+    end_with_parent()
     parent = multiprocessing.parent_process()
     if parent is None:
         return

@@ -10,7 +10,7 @@ import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
@@ -20,6 +20,7 @@ from pettingzoo import ParallelEnv
 
 from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import check_name
+from di_envs.copying import Copyable
 from di_envs.course import load_course
 from di_envs.drawing.screen import Screen, check_render_mode
 from di_envs.numerics.keyed_random import Stream, keyed_hash
@@ -45,7 +46,7 @@ class MultiEgoSnapshot:
     np_random: Mapping[str, Any]
 
 
-class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
+class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
     """Several egos, `ego_0`, `ego_1`, …, in one world.
 
     Observations, rewards, ends and `info` are each ego's own, as `RouteEnv` describes them. An ego
@@ -63,6 +64,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         "render_modes": ["human", "rgb_array"],
         "render_fps": 10,
     }
+    SPACES: ClassVar[tuple[str, ...]] = ("_observation_spaces", "_action_spaces")
 
     def __init__(self, egos: int = 2, *, render_mode: str | None = None, **options: Any) -> None:
         """Loads the town and plans the routes.
@@ -75,6 +77,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         Raises:
             ValueError: If an option is refused, or there are fewer routes than egos.
         """
+        before = frozenset(vars(self))
         check_render_mode(render_mode)
         if egos < 1:
             raise ValueError(f"egos must be at least 1; got {egos!r}.")
@@ -97,6 +100,7 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         first = course.observer()
         self._observers = [first.of_ego(ego) for ego in range(egos)]
         self._np_random, _ = seeding.np_random(None)
+        self._remember({"egos": egos, "render_mode": render_mode, **options}, before)
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """The space of one ego's observations; always the same object."""
@@ -214,6 +218,17 @@ class MultiEgoEnv(ParallelEnv[str, Observation, Any]):
         if snapshot.world is not None:
             self.world.restore(snapshot.world)
             self._start()
+
+    def twin(self) -> Self:
+        """Another environment like this one, not begun; it shares the town, routes and tables."""
+        twin = self._shallow()
+        twin.world = self.world.twin()
+        twin.agents, twin.possible_agents = [], list(self.possible_agents)
+        for name in self.SPACES:
+            setattr(twin, name, copy.deepcopy(getattr(self, name)))
+        twin._observers = [self._observers[0].of_ego(ego) for ego in range(len(self._observers))]
+        twin._np_random, _ = seeding.np_random(None)
+        return twin
 
     def _draw(self, agent: str, observations: Mapping[str, Observation]) -> Any:
         assert self._screen is not None

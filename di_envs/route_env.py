@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import gymnasium
 import numpy as np
 
 from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
+from di_envs.copying import Copyable
 from di_envs.course import load_course
 from di_envs.drawing.screen import Screen, check_render_mode
 from di_envs.numerics.keyed_random import Stream, keyed_hash
@@ -41,7 +42,7 @@ class RouteEnvSnapshot:
     np_random_seed: int
 
 
-class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
+class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     """Drives one route an episode, among traffic and walkers, by the Leaderboard's rules.
 
     An episode terminates when the route is completed, when the ego has left it or is blocked, and
@@ -67,6 +68,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         "render_modes": ["human", "rgb_array"],
         "render_fps": 10,
     }
+    SPACES: ClassVar[tuple[str, ...]] = ("observation_space", "action_space")
 
     def __init__(
         self, *, render_mode: str | None = None, cached: bool = True, **options: Any
@@ -86,6 +88,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
             FileNotFoundError: If there is no such town.
             RuntimeError: If there is no display for `human`.
         """
+        before = frozenset(vars(self))
         check_render_mode(render_mode)
         self._course = course = load_course(options, cached=cached)
         self.config, self.plans = course.config, course.plans
@@ -98,6 +101,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._screen = None if render_mode is None else Screen(course, render_mode)
         self._begun = False
         self._over = True
+        self._remember({"render_mode": render_mode, **options}, before)
 
     @property
     def route_ids(self) -> tuple[str, ...]:
@@ -270,7 +274,7 @@ class RouteEnv(gymnasium.Env[Observation, np.ndarray[Any, Any]]):
 
         What is shared never changes, so twins may be stepped in threads of their own.
         """
-        twin = copy.copy(self)
+        twin = self._shallow()
         twin.world = self.world.twin()
         twin.observation_space = copy.deepcopy(self.observation_space)
         twin.action_space = copy.deepcopy(self.action_space)

@@ -7,6 +7,7 @@ the way. Nothing is imported here: only the place where Python would find each n
 
 from __future__ import annotations
 
+import shlex
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,9 +33,12 @@ def check_not_shadowed(top: Path, names: tuple[str, ...] = SHADOWED_NAMES) -> No
         if found and ours.resolve() != found[0]:
             raise ImportError(
                 f"`{name}` is DriveInsight's package at {ours}, but another one comes first: "
-                f"{found[0]}. Put {top} before {found[0].parent} on sys.path (for PYTHONPATH: name "
-                f"it first), or remove the other package (CARLA's Python API and openai-agents "
-                f"have packages called `{name}` too)."
+                f"{found[0]} (CARLA's Python API and openai-agents have packages of that name). "
+                f"Put {top} before {found[0].parent}: "
+                f"PYTHONPATH={shlex.quote(str(top))}:$PYTHONPATH driveinsight …, and not `python "
+                "-m` in that folder, where it comes before all; or remove the other package",
+                name=name,
+                path=str(found[0]),
             )
 
 

@@ -51,7 +51,7 @@ def check_spaces(env: Environment, *, seed: int = 0, steps: int = 50) -> None:
         for name, value in _items(observation):
             if isinstance(value, np.ndarray):
                 shared = np.shares_memory(value, dict(_items(last))[name])
-                assert not shared, f"step {step}: '{name}' is the array of the step before"
+                _hold(not shared, f"step {step}: '{name}' is the array of the step before")
         if terminated or truncated:
             observation, _ = env.reset()
 
@@ -61,9 +61,9 @@ def check_determinism(
 ) -> None:
     """Equal seeds give equal bits: in a twin, and after another episode was driven."""
     first = drive(env, seed, steps)
-    assert drive(twin, seed, steps) == first, "a twin of equal seed gave other bits"
+    _hold(drive(twin, seed, steps) == first, "a twin of equal seed gave other bits")
     drive(env, seed + 1, steps)
-    assert drive(env, seed, steps) == first, "another episode in between changed this one"
+    _hold(drive(env, seed, steps) == first, "another episode in between changed this one")
 
 
 def check_save_restore(
@@ -75,10 +75,12 @@ def check_save_restore(
     first = drive(env, seed, steps, begin=False)
     drive(env, seed + 1, steps)
     restore(env, snapshot)
-    assert drive(env, seed, steps, begin=False) == first, "a restored episode went another way"
+    again = drive(env, seed, steps, begin=False)
+    _hold(again == first, "a restored episode went another way")
     twin.reset(seed=seed + 2)
     restore(twin, snapshot)
-    assert drive(twin, seed, steps, begin=False) == first, "a twin went another way from a snapshot"
+    there = drive(twin, seed, steps, begin=False)
+    _hold(there == first, "a twin went another way from a snapshot")
 
 
 def drive(env: Environment, seed: int, steps: int, *, begin: bool = True) -> str:
@@ -104,7 +106,8 @@ def drive(env: Environment, seed: int, steps: int, *, begin: bool = True) -> str
 def keyed_action(env: Environment, seed: int, step: int) -> np.ndarray[Any, Any]:
     """An action within the Box of the environment, a function of seed and step alone."""
     space = env.action_space
-    assert isinstance(space, gymnasium.spaces.Box), f"expected a Box of actions, got {space}"
+    if not isinstance(space, gymnasium.spaces.Box):
+        raise AssertionError(f"expected a Box of actions, got {space}")
     draws = [uniform(seed, int(Stream.AGENT), step, k) for k in range(int(np.prod(space.shape)))]
     action = space.low + np.reshape(draws, space.shape) * (space.high - space.low)
     return action.astype(space.dtype)
@@ -116,9 +119,15 @@ def _items(observation: Any) -> list[tuple[str, Any]]:
 
 
 def _check_observation(env: Environment, observation: Any, when: str) -> None:
-    assert observation in env.observation_space, f"{when}: the observation is not in its space"
+    _hold(observation in env.observation_space, f"{when}: the observation is not in its space")
     for name, value in _items(observation):
-        assert np.isfinite(value).all(), f"{when}: '{name}' holds NaN or infinity"
+        _hold(bool(np.isfinite(value).all()), f"{when}: '{name}' holds NaN or infinity")
+
+
+def _hold(promise: bool, broken: str) -> None:
+    """Raises where a promise is not kept; `assert` would be left out by `python -O`."""
+    if not promise:
+        raise AssertionError(broken)
 
 
 def _add(digest: Any, value: Any) -> None:

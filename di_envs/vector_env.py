@@ -9,19 +9,22 @@ made for all once they are through, as threads that keep asking for Python's loc
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from di_envs.actions.checked import HIGH, LOW, checked_action
+from di_envs.copying import Copyable
 from di_envs.reward import Standing
 from di_envs.route_env import Info, Observation, RouteEnv, RouteEnvSnapshot
 from di_envs.vector_rows import WorldRows, batched_infos
@@ -41,7 +44,7 @@ class VectorSnapshot:
     ended: tuple[bool, ...]  # whether the next step resets it, or refuses to step it
 
 
-class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
+class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     """N `RouteEnv`s side by side, by Gymnasium's rules for autoreset, seeds and `info`.
 
     `gym.make_vec("DriveInsight-Town05Long-v1", num_envs=16)` makes one. Observations, rewards and
@@ -51,6 +54,11 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         envs: The environments, which share their town, routes and tables.
         threads: How many threads step them.
     """
+
+    SPACES: ClassVar[tuple[str, ...]] = (
+        *("observation_space", "action_space"),
+        *("single_observation_space", "single_action_space"),
+    )
 
     def __init__(
         self,
@@ -79,6 +87,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         Raises:
             ValueError: If a number is not positive, or an option is refused.
         """
+        before = frozenset(vars(self))
         threads = min(_cores(), num_envs) if threads is None else threads
         steps = 1 if max_episode_steps is None else max_episode_steps
         for name, value in (
@@ -108,8 +117,13 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._limit = max_episode_steps
         self._steps = [0] * num_envs
         self._ended = np.zeros(num_envs, bool)
-        # the calling thread works too
-        self._pool = ThreadPoolExecutor(threads - 1, "worlds") if threads > 1 else None
+        self._pool: ThreadPoolExecutor | None = None
+        self._pool_of = 0
+        made_with = {
+            **{"num_envs": num_envs, "threads": threads, "autoreset_mode": autoreset_mode},
+            **{"max_episode_steps": max_episode_steps, "render_mode": render_mode},
+        }
+        self._remember({**made_with, **options}, before)
 
     def reset(
         self,
@@ -207,6 +221,19 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._steps = list(snapshot.steps)
         self._ended = np.array(snapshot.ended)
 
+    def twin(self) -> Self:
+        """Another environment like this one, not begun; it shares the town, routes and tables."""
+        twin = self._shallow()
+        twin.envs = tuple(env.twin() for env in self.envs)
+        for name in self.SPACES:
+            setattr(twin, name, copy.deepcopy(getattr(self, name)))
+        space = twin.single_observation_space
+        assert isinstance(space, spaces.Dict)
+        twin._looks = WorldRows(space, [env.observer for env in twin.envs])
+        twin._steps, twin._ended = [0] * self.num_envs, np.zeros(self.num_envs, bool)
+        twin._pool = None
+        return twin
+
     def observe(self) -> Observation:
         """The present observation once more: after `restore`, for instance. Changes nothing."""
         rows = self._looks.fresh()
@@ -229,7 +256,7 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 
     def close_extras(self, **_options: Any) -> None:
         """Stops the threads and closes the environments."""
-        if self._pool is not None:
+        if self._pool is not None and self._pool_of == os.getpid():
             self._pool.shutdown()
         for env in self.envs:
             env.close()
@@ -281,17 +308,26 @@ class RouteVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             for index in todo:
                 work(index)
 
-        helpers = (
-            []
-            if self._pool is None
-            else [self._pool.submit(labour) for _ in range(self.threads - 1)]
-        )
+        pool = self._threads()
+        helpers = [] if pool is None else [pool.submit(labour) for _ in range(self.threads - 1)]
         try:
             labour()
         finally:
             errors = [helper.exception() for helper in helpers]
         for error in filter(None, errors):
             raise error
+
+    def _threads(self) -> ThreadPoolExecutor | None:
+        """The threads beside the calling one; made anew in a process that was forked.
+
+        A fork takes no threads along, and whoever waits for one there waits for ever.
+        """
+        if self.closed:
+            raise ClosedEnvironmentError("The environment is closed: make another one.")
+        if self.threads > 1 and (self._pool is None or self._pool_of != os.getpid()):
+            self._pool = ThreadPoolExecutor(self.threads - 1, "worlds")
+            self._pool_of = os.getpid()
+        return self._pool
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:

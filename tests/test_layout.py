@@ -50,6 +50,7 @@ MODULES = sorted(path for package in ALLOWED for path in (TOP / package).rglob("
 ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za-z]:[\\/])")
 # Modules that ask the environment, and why they may
 ASKING = {
+    "di_envs/files/caches.py": "who runs a container says by one where caches may be written",
     "di_envs/numerics/kernels.py": "Numba is told by one, before it loads, to keep bits equal",
     "leaderboard/running/workers/ray_engine.py": "Ray is told by one to report nobody's usage",
     "agents/training/distributed.py": "torchrun tells its processes which of how many they are",

@@ -43,6 +43,22 @@ DROPOUT: Mapping[str, float] = MappingProxyType(
 TOGETHER: Mapping[str, float] = MappingProxyType({"map+obstacles+traffic_lights+stop_signs": 0.5})
 
 
+LARGEST = 4096  # of any number that sizes a network: more is a slip, and would take all memory
+
+
+def check_sizes(config: Any, *names: str) -> None:
+    """Refuses sizes of which no network is made.
+
+    Raises:
+        ValueError: Names the first that is not from 1 to `LARGEST`.
+    """
+    for name in names:
+        value = getattr(config, name)
+        for size in value if isinstance(value, tuple | list) else (value,):
+            if not 1 <= size <= LARGEST:
+                raise ValueError(f"{name} must be from 1 to {LARGEST}, not {size}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class CameraEncoderConfig:
     """Images to BEV features; images of each size have a backbone of their own.
@@ -71,6 +87,7 @@ class CameraEncoderConfig:
 
     def __post_init__(self) -> None:
         rig_of(self.rig)
+        check_sizes(self, "depths", "width", "channels", "depth_bins")
         check_name(self.block, ("basic", "bottleneck"), "ResNet block")
         object.__setattr__(self, "depths", tuple(self.depths))
         strides = tuple(4 * 2**n for n in range(len(self.depths)))
@@ -102,6 +119,7 @@ class LidarEncoderConfig:
         object.__setattr__(self, "heights_m", tuple(self.heights_m))
         if len(self.heights_m) < 2 or list(self.heights_m) != sorted(set(self.heights_m)):
             raise ValueError(f"heights_m must be two or more that rise, not {self.heights_m}")
+        check_sizes(self, "channels")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,6 +139,9 @@ class FusionConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "widths", tuple(self.widths))
+        check_sizes(self, "widths", "width", "remembered")
+        if not self.widths:
+            raise ValueError("widths needs a level")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,6 +173,9 @@ class PlannerConfig:
     together: Mapping[str, float] = field(default_factory=lambda: TOGETHER)
 
     def __post_init__(self) -> None:
+        check_sizes(self, "width", "heads", "layers", "bev_tokens", "waypoints")
+        if not self.waypoint_dt_s > 0.0:
+            raise ValueError(f"waypoint_dt_s must be positive, not {self.waypoint_dt_s:g}")
         if self.width % self.heads:
             raise ValueError(f"{self.heads} heads do not share a width of {self.width} evenly")
         object.__setattr__(self, "dropout", MappingProxyType(dict(self.dropout)))
@@ -191,8 +215,11 @@ class PolicyConfig:
         object.__setattr__(self, "prompt", tuple(self.prompt))
         for name in self.prompt:
             check_name(name, COMPONENTS, "prompt component")
-        if self.memory_frames < 0:
-            raise ValueError(f"memory_frames must be 0 or more, not {self.memory_frames}")
+        check_sizes(self, "bev_width")
+        if not 0 <= self.memory_frames <= LARGEST:
+            raise ValueError(f"memory_frames must be from 0 to {LARGEST}, not {self.memory_frames}")
+        if not self.memory_dt_s > 0.0:
+            raise ValueError(f"memory_dt_s must be positive, not {self.memory_dt_s:g}")
         if not self.sensors and not self.prompt:
             raise ValueError("a policy needs a camera, a LiDAR or a prompt component")
 

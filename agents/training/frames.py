@@ -8,9 +8,7 @@ any camera, and with the ego set a little aside.
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.files.json_values import JsonError, from_json, one_line, parsed, read_json
+from di_envs.files.names import check_name
+from di_envs.files.received import check_array, read_arrays
 from di_envs.files.whole import write_whole
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -29,6 +29,7 @@ from di_envs.world.world import WorldView
 FRAME_S = 0.5
 REACH_M = 120.0  # up to which actors are kept
 FORMAT = 2
+MOST_ACTORS = 10_000  # of a kind; no world has as many
 
 # What is kept of actors; of egos, lights and the clock all is.
 ACTOR_FIELDS = (
@@ -231,15 +232,14 @@ def read_drive(path: Path) -> RecordedDrive:
         DriveFileError: If the file is missing, cut off, or of another format.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes())) as file:
-            content = {name: file[name] for name in file.files}
+        content = read_arrays(path)
         version = int(content["format"])
         if version != FORMAT:
             raise DriveFileError(
                 f"{path} is of format {version}, this program reads {FORMAT}: collect it again"
             )
-        return RecordedDrive(
-            facts=from_json(dict[str, Any], parsed(str(content["facts"]), "facts"), "facts"),
+        drive = RecordedDrive(
+            facts=_facts(str(content["facts"])),
             capacity=Capacity(*content["capacity"].tolist()),
             whole=_part("whole.", content),
             actors=_part("actors.", content),
@@ -248,12 +248,57 @@ def read_drive(path: Path) -> RecordedDrive:
             controls=content["controls"],
             shown=content.get("shown"),
         )
+        _check(drive)
     except DriveFileError:
         raise
-    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise DriveFileError(
             f"{path} is missing or not whole ({error!r}): delete it and run collect again"
         ) from error
+    return drive
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Facts:
+    """What is read of a drive's facts; there are more."""
+
+    town: str
+    town_hash: str
+    number: int
+    route_id: str
+    scenarios: dict[str, int] = field(default_factory=dict)
+
+
+def _facts(text: str) -> dict[str, Any]:
+    facts = from_json(dict[str, Any], parsed(text, "facts"), "facts")
+    from_json(_Facts, facts, "facts", foreign=True)
+    return facts
+
+
+def _check(drive: RecordedDrive) -> None:
+    """Refuses arrays that do not belong together, with numbers that no drive has.
+
+    Raises:
+        ValueError: Names the array.
+    """
+    moments, actors = len(drive.first) - 1, len(drive.actor_id)
+    capacity = drive.capacity
+    if min(capacity) < 0 or max(capacity) > MOST_ACTORS or moments < 1:
+        raise ValueError(f"capacity: {capacity} of {moments} moments is none of a drive")
+    check_array({"first": drive.first}, "first", "iu", (None,))
+    check_array({"actor_id": drive.actor_id}, "actor_id", "iu", (None,))
+    check_array({"controls": drive.controls}, "controls", "f", (moments, None), finite=True)
+    steps = np.diff(drive.first)
+    if drive.first[0] != 0 or drive.first[-1] != actors or (steps < 1).any():
+        raise ValueError("first: does not share the actors out among the moments")
+    layout = state_dtype(capacity)
+    if ((drive.actor_id < 0) | (drive.actor_id >= layout["x"].shape[0])).any():
+        raise ValueError("actor_id: names an actor that there is not")
+    for name in drive.whole:
+        check_name(name, _whole_fields(capacity), "field of a state")
+        check_array(drive.whole, name, layout[name].base.kind, (moments, *layout[name].shape))
+    for name in ACTOR_FIELDS:
+        check_array(drive.actors, name, layout[name].base.kind, (actors,), finite=True)
 
 
 def _part(prefix: str, content: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

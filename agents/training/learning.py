@@ -25,6 +25,7 @@ from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
 from agents.training.samples import Batch, hidden_components, without
 from di_envs.differences import differences
+from di_envs.files.received import check_ordinary
 from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 
@@ -78,13 +79,12 @@ class Training:
         """
         device = next(self.policy.parameters()).device
         try:
+            check_ordinary(path)
             content = torch.load(path, weights_only=True, map_location=device)
             policy, config = content["policy_config"], content["config"]
-        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError,
-                pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
-            raise TrainingError(
-                f"{path} is not whole ({error!r}): delete it to begin again"
-            ) from error
+        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError, IndexError,
+                AttributeError, pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
+            raise _not_whole(path, error) from error
         different = [
             *differences(policy, self.policy.config.to_mapping()),
             # what a field did that is newer than the checkpoint is what its default does
@@ -96,9 +96,12 @@ class Training:
                 f"{path} is of another training ({said}): give the same options "
                 f"to go on with it, or another --output to begin a new one"
             )
-        self.policy.load_state_dict(content["policy"])
-        self.optimiser.load_state_dict(content["optimiser"])
-        self.step = content["step"]
+        try:
+            self.policy.load_state_dict(content["policy"])
+            self.optimiser.load_state_dict(content["optimiser"])
+            self.step = int(content["step"])
+        except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+            raise _not_whole(path, error) from error
 
     def update(self, batch: Batch) -> dict[str, float]:
         """One step on a batch, or on a share of it; returns the terms of the whole batch's loss.
@@ -172,6 +175,10 @@ class Training:
             return torch.ones(size, len(TOKENS))
         key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
         return hidden_components(self.policy.config, size, key)
+
+
+def _not_whole(path: Path, error: Exception) -> TrainingError:
+    return TrainingError(f"{path} is not whole ({error!r}): delete it to begin again")
 
 
 def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from agents.training.config import HELD_OUT
+from agents.training.config import HELD_OUT, TrainingError
+from di_envs.files.received import read_bytes
 from di_envs.files.whole import write_whole
 
 Row = Mapping[str, float | None]
@@ -15,7 +17,7 @@ Row = Mapping[str, float | None]
 
 def append_row(path: Path, row: Row) -> None:
     """Appends a row; the first one brings the names of the columns, None leaves one empty."""
-    fresh = not path.exists()
+    fresh = not path.exists() or not path.stat().st_size
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         if fresh:
@@ -25,27 +27,55 @@ def append_row(path: Path, row: Row) -> None:
 
 def read_rows(path: Path) -> list[dict[str, float]]:
     """All rows, without what is empty in them; none if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        return [
-            {name: float(text) for name, text in row.items() if text}
-            for row in csv.DictReader(file)
-        ]
+    names, rows = _table(path)
+    return [
+        {name: float(text) for name, text in zip(names, row, strict=True) if text} for row in rows
+    ]
 
 
 def forget_rows_after(path: Path, step: int) -> None:
     """Takes away what was written after a checkpoint: it comes again."""
     if not path.exists():
         return
-    with path.open(newline="", encoding="utf-8") as file:
-        names, *rows = list(csv.reader(file)) or [["step"]]
-    at = names.index("step")
-    kept = [row for row in rows if float(row[at]) <= step]
-    if len(kept) < len(rows):
-        text = io.StringIO(newline="")
-        csv.writer(text).writerows([names, *kept])
+    names, rows = _table(path)
+    kept = [row for row in rows if float(row[names.index("step")]) <= step]
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows([names, *kept] if names else [])
+    if text.getvalue().encode() != read_bytes(path):
         write_whole(path, text.getvalue())
+
+
+def _table(path: Path) -> tuple[list[str], list[list[str]]]:
+    """The columns' names and the rows, but for those that a kill cut short or that are garbled.
+
+    Raises:
+        TrainingError: If it is some other file.
+    """
+    if not path.exists():
+        return [], []
+    try:
+        text = read_bytes(path).decode("utf-8", errors="replace")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    except (OSError, csv.Error) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise TrainingError(f"{path} is no log of a training ({why}): remove it") from error
+    if not names:
+        return [], []
+    if "step" not in names:
+        raise TrainingError(f"{path} is no log of a training: remove it, or name another --output")
+    whole = text.endswith("\n")  # else the last row was cut short, perhaps within a number
+    kept = [row for row in (rows if whole else rows[:-1]) if _is_row(row, names)]
+    return names, kept
+
+
+def _is_row(row: list[str], names: list[str]) -> bool:
+    """Whether these are numbers, or nothing, under each name; a row always has its step."""
+    try:
+        values = [float(text) for text in row if text]
+    except ValueError:
+        return False
+    whole = len(row) == len(names) and bool(row[names.index("step")])
+    return whole and all(map(math.isfinite, values))
 
 
 def _text(value: float | None) -> str:

@@ -1,7 +1,7 @@
 """The seven towns that policies are trained in; Town05 is not among them, nor anything like it.
 
 Their styles are those of CARLA's other towns. Maps, routes and triggers are made when they are
-first wanted, kept in the user's cache folder, and the same everywhere: all draws are keyed
+first wanted, kept in our caches, and the same everywhere: all draws are keyed
 by the town's name. There is no end to the routes: they come in blocks of `ROUTES`, and the number
 of a drive says which is its own.
 
@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
 
 from agents.training.street_grids import TownStyle, street_tables
 from di_envs.config import check_name
+from di_envs.files.caches import ASKED, cache_folders, writable_cache
 from di_envs.files.whole import whole_folder
 from di_envs.suites import Suite, choose_suite, load_suite, suite_names
 from di_envs.town.building.junction_layout import town_text
@@ -192,6 +192,7 @@ def town_files(name: str, block: int = 0) -> TownFiles:
 
     Raises:
         ValueError: If there is no such town; suggests the nearest.
+        OSError: If it cannot be written.
     """
     check_name(name, KNOWN_TOWNS, "training town")
     files = (_shipped_files if name in SHIPPED_TOWNS else _made_files)(name, block)
@@ -205,12 +206,11 @@ def town_files(name: str, block: int = 0) -> TownFiles:
 
 def _made_files(name: str, block: int) -> TownFiles:
     """Of a made-up town; its map is made if it is not there."""
-    place = user_cache_path("driveinsight") / "training"
-    first = place / f"{name}-{_recipe_hash(name)}"
+    first = _place(f"{name}-{_recipe_hash(name)}", "scenarios.json")
     style = TRAINING_TOWNS[name]
     files = TownFiles(
         name=name,
-        folder=first.with_name(f"{first.name}-{block}") if block else first,
+        folder=_place(f"{first.name}-{block}", _ROUTE_FILE) if block else first,
         town=first / f"{name}.xodr",
         scenarios=first / "scenarios.json",
         traffic=style.vehicles,
@@ -222,16 +222,30 @@ def _made_files(name: str, block: int) -> TownFiles:
     return files
 
 
+def _place(folder: str, holds: str) -> Path:
+    """Where a folder with that file lies in our caches, or is to be made.
+
+    Raises:
+        OSError: If it is nowhere, and no cache can be written.
+    """
+    for place in cache_folders("training"):
+        if (place / folder / holds).is_file():
+            return place / folder
+    kept = writable_cache("training")
+    if kept is None:
+        raise OSError(f"there is no folder to make '{folder}' in: name one in {ASKED}")
+    return kept / folder
+
+
 def _shipped_files(name: str, block: int) -> TownFiles:
     """Of a shipped town, among as many others as in its suites."""
     suites = _suites_in(name)
     suite = next(suite for suite in suites if suite.scenario_paths)
     level = suite.traffic_in(training_town(name))
     ends = hashlib.blake2b(_ends_taken(name).tobytes(), digest_size=6).hexdigest()
-    place = user_cache_path("driveinsight") / "training"
     return TownFiles(
         name=name,
-        folder=place / f"{name}-{VERSION}-{ends}-{block}",
+        folder=_place(f"{name}-{VERSION}-{ends}-{block}", _ROUTE_FILE),
         town=suite.town_path,
         scenarios=suite.scenario_paths[0],
         traffic=level.vehicles,

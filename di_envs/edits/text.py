@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from di_envs.config import check_name
+from di_envs.files.plain_text import one_plain_line
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_.]*"
 _VALUE = r"[^,;@=\s]+"
@@ -24,6 +25,9 @@ _EXAMPLE = "such as remove:actor=17 or move:actor=17,ahead=5"
 
 class EditError(ValueError):
     """An edit that cannot be read or carried out; the message says what to write instead."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_plain_line(message))  # it quotes what was written
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, Union
 
 from di_envs.files.names import name_hint
+from di_envs.files.received import read_bytes
 
 T = TypeVar("T")
 
@@ -54,7 +55,7 @@ def read_json(path: Path) -> Any:
         JsonError: If it cannot be read, or is not JSON as RFC 8259 has it.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path).decode("utf-8")
     except OSError as error:
         raise JsonError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
@@ -74,7 +75,7 @@ def parsed(text: str, source: str) -> Any:
     """
     try:
         value = json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_integer)
-    except RecursionError:
+    except (RecursionError, MemoryError):
         raise JsonError(f"{source}: is nested deeper than {DEEPEST} lists and objects") from None
     except ValueError as error:
         raise JsonError(f"{source}: is not whole JSON: {error}") from error

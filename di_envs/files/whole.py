@@ -1,18 +1,22 @@
 """Files and folders that are there whole or not at all, however a process ends.
 
 They are written beside their place, then renamed: a reader finds the old one or the new one, and a
-failure leaves nothing behind. After a kill a hidden file `.NAME.…` may stay.
+failure leaves nothing behind. After a kill a hidden file `.NAME.RANDOM.unfinished` may stay;
+`unfinished` finds those of one file.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
+
+UNFINISHED = ".unfinished"  # what the name of a file ends in that was not written to its end
 
 
 def write_whole(path: Path, content: str | bytes | Callable[[IO[bytes]], Any]) -> None:
@@ -27,7 +31,7 @@ def write_whole(path: Path, content: str | bytes | Callable[[IO[bytes]], Any]) -
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(
-        dir=path.parent, prefix=f".{path.name}.", delete=False
+        dir=path.parent, prefix=f".{path.name}.", suffix=UNFINISHED, delete=False
     ) as file:
         try:
             _fill(file, content)
@@ -38,6 +42,20 @@ def write_whole(path: Path, content: str | bytes | Callable[[IO[bytes]], Any]) -
         except BaseException:
             os.unlink(file.name)
             raise
+
+
+def unfinished(folder: Path, name: str) -> list[Path]:
+    """What killed processes left of a file that `write_whole` was to write.
+
+    Args:
+        folder: Of the file.
+        name: A pattern for its whole name, as `re` has it.
+    """
+    # eight characters, as `tempfile` draws them
+    left = re.compile(rf"\.(?:{name})\.[a-z0-9_]{{8}}{re.escape(UNFINISHED)}")
+    if not folder.is_dir():
+        return []
+    return sorted(path for path in folder.iterdir() if left.fullmatch(path.name))
 
 
 def _fill(file: IO[bytes], content: str | bytes | Callable[[IO[bytes]], Any]) -> None:

@@ -1,8 +1,8 @@
 """How kernels are compiled and where their machine code is kept.
 
 Numba's own cache goes stale when a helper in another module changes, so a kernel is cached in a
-directory of the user's cache folder that is named by its source and those it builds on, Numba's
-version and the CPU. A change of any of these gives a new directory, never stale code.
+folder of ours (`di_envs.files.caches`) that is named by its source and those it builds on, Numba's
+version and the CPU. A change of any of these gives a new folder, never stale code.
 """
 
 from __future__ import annotations
@@ -22,10 +22,15 @@ os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
 
 import llvmlite.binding
 import numba
-from platformdirs import user_cache_path
+
+from di_envs.files.caches import cache_folders
+from di_envs.numerics.code_cache import CodeCache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_PART = "kernels"  # of the caches
+# What only says where code is kept, not what it does
+_KEEPING = ("di_envs.files.caches", "di_envs.numerics.code_cache")
 _IMPORT = re.compile(rb"^from ((?:di_envs|agents)[.\w]*) import", re.MULTILINE)
 
 
@@ -37,7 +42,7 @@ def _source(module: str) -> tuple[bytes, tuple[str, ...]]:
     path = loaded or (spec.origin if spec else None)
     text = Path(path).read_bytes() if path else b""
     imported = {match.decode() for match in _IMPORT.findall(text)}
-    return text, tuple(sorted(imported))
+    return text, tuple(sorted(imported.difference(_KEEPING)))
 
 
 @cache
@@ -72,16 +77,18 @@ def kernel_sources() -> list[Path]:
 
 
 def kernel_cache() -> Path:
-    """The folder of compiled kernels, below the user's cache folder."""
-    return user_cache_path("driveinsight") / "kernels"
+    """The folder where compiled kernels are looked for first."""
+    return cache_folders(_PART)[0]
 
 
 def kernel(function: Function) -> Function:
     """Compiles `function` without the Python interpreter, releasing the GIL, never `fastmath`."""
-    # read by Numba as it sets up the function's cache, just below
-    numba.config.CACHE_DIR = str(kernel_cache() / sources_digest(function.__module__))
-    compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    if not numba.config.DISABLE_JIT:
+        part = f"{_PART}/{sources_digest(function.__module__)}"
+        compiled._cache = CodeCache(function, part)  # as Numba's own `enable_caching` sets it
+    kernel: Function = compiled
+    return kernel
 
 
 def bind(function: Function, *arguments: Any) -> Function:

@@ -1,4 +1,4 @@
-"""Parsed towns in the user's cache folder, safe when several processes write at once.
+"""Parsed towns in our caches, safe when several processes write at once.
 
 A town is one `.npz` file named by a hash of all that it was made from: the map, its signals and the
 reader's own source, so that an edited reader never finds what another one left. A file that cannot
@@ -7,22 +7,24 @@ be read is no error: the town is parsed again and the file replaced.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from platformdirs import user_cache_path
+from numpy.typing import NDArray
 
+from di_envs.files.caches import cache_folders, warn_not_kept, writable_cache
 from di_envs.files.json_values import from_json, parsed
+from di_envs.files.received import read_arrays
 from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.town.town import Town
 
+_PART = "towns"  # of the caches
 # The modules that decide what a town's arrays hold; a test compares them with what is imported.
 READER_MODULES = (
     "cache",
@@ -54,14 +56,10 @@ class _About:
     """What a file holds beside arrays."""
 
     key: str
+    digest: str  # of the arrays
     road_names: tuple[str, ...]
     junction_names: tuple[str, ...]
     geo_origin: tuple[float, float]
-
-
-def cache_folder() -> Path:
-    """Where parsed towns are kept."""
-    return user_cache_path("driveinsight") / "towns"
 
 
 def reader_version() -> str:
@@ -84,21 +82,36 @@ def cache_key(town_hash: str) -> str:
     return hashlib.sha256(f"{town_hash} {reader_version()}".encode()).hexdigest()[:32]
 
 
-def load_cached(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | None:
-    """The town of a `content_hash`, or None where there is no readable one."""
+def load_cached(
+    town_hash: str, name: str, opendrive: str, folder: Path | None = None
+) -> Town | None:
+    """The town of a `content_hash`, or None where there is no readable one.
+
+    Args:
+        town_hash: Of the town.
+        name: What the town is to be called.
+        opendrive: Its OpenDRIVE text.
+        folder: Where to look; None for all places of our caches.
+    """
+    folders = cache_folders(_PART) if folder is None else (folder,)
+    found = (_loaded(town_hash, name, opendrive, place) for place in folders)
+    return next((town for town in found if town is not None), None)
+
+
+def _loaded(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | None:
     key = cache_key(town_hash)
     path = folder / f"{key}.npz"
     try:
-        # Opened here: np.load would leave a file open that turns out to be no archive.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = from_json(_About, parsed(str(stored["about"]), str(path)), str(path))
-            arrays = {
-                part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
-                for part, kind in _PARTS.items()
-            }
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        stored = read_arrays(path)
+        about = from_json(_About, parsed(str(stored.pop("about")), str(path)), str(path))
+        arrays = {
+            part: kind(**{field: _frozen(stored[f"{part}.{field}"]) for field in kind._fields})
+            for part, kind in _PARTS.items()
+        }
+    except (ValueError, KeyError):
         return None
-    if about.key != key:
+    # Kernels look up numbers in these arrays unchecked, so they must be those that were written
+    if about.key != key or about.digest != _digest(stored):
         return None
     return Town(
         name=name,
@@ -114,25 +127,45 @@ def load_cached(town_hash: str, name: str, opendrive: str, folder: Path) -> Town
 _PARTS: dict[str, Any] = {"lanes": Lanes, "signals": Signals, "crosswalks": Crosswalks}
 
 
-def store(town: Town, folder: Path) -> None:
-    """Writes a town for later; a cache folder that cannot be written is not an error."""
+def store(town: Town, folder: Path | None = None) -> None:
+    """Writes a town for later; a cache folder that cannot be written is not an error.
+
+    Args:
+        town: The town.
+        folder: Where to; None for our caches.
+    """
+    place = writable_cache(_PART) if folder is None else folder
+    if place is None:
+        return
     key = cache_key(town.content_hash)
-    about = {
-        "key": key,
-        "road_names": town.road_names,
-        "junction_names": town.junction_names,
-        "geo_origin": town.geo_origin,
-    }
     arrays = {
         f"{part}.{field}": value
         for part in _PARTS
         for field, value in getattr(town, part)._asdict().items()
     }
-    with contextlib.suppress(OSError):
+    about = {
+        "key": key,
+        "digest": _digest(arrays),
+        "road_names": town.road_names,
+        "junction_names": town.junction_names,
+        "geo_origin": town.geo_origin,
+    }
+    try:
         write_whole(
-            folder / f"{key}.npz",
+            place / f"{key}.npz",
             lambda file: np.savez(file, about=np.array(json.dumps(about)), **arrays),
         )
+    except OSError as error:
+        warn_not_kept(place, error)
+
+
+def _digest(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Names arrays with all that they hold."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode() + array.tobytes())
+    return digest.hexdigest()
 
 
 def freeze(town: Town) -> Town:

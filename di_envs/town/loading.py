@@ -6,6 +6,7 @@ import difflib
 import warnings
 from pathlib import Path
 
+from di_envs.files.received import read_bytes
 from di_envs.town import cache
 from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.crosswalks import find_crosswalks
@@ -53,7 +54,7 @@ def load_town(
             (`di_envs.town.reading.sidecar` has its format). "synthesise": a guess from the
             junctions' shapes (`di_envs.town.reading.guessing`); a warning says what it made.
             "none": there are none.
-        cache_folder: Where parsed towns are kept; by default the user's cache folder.
+        cache_folder: Where parsed towns are kept; by default in our caches.
         cached: Whether to look there, and to keep the town there; False reads the map itself.
 
     Raises:
@@ -62,21 +63,27 @@ def load_town(
     """
     path = _known_path(town, TOWNS, "OpenDRIVE file and no shipped town", ())
     source, sidecar = _signal_source(signals)
-    content = path.read_bytes()
-    told = sidecar.read_bytes() if sidecar is not None else b""
+    content = _content(path)
+    told = _content(sidecar) if sidecar is not None else b""
     key = cache.content_hash(content, source.encode() + b"\0" + told)
-    folder = cache.cache_folder() if cache_folder is None else Path(cache_folder)
     text = decode_xml(content, str(path))
-    loaded = cache.load_cached(key, path.stem, text, folder) if cached else None
+    loaded = cache.load_cached(key, path.stem, text, cache_folder) if cached else None
     if loaded is None:
         loaded = cache.freeze(_parse(path, text, source, sidecar, key))
         if cached:
-            cache.store(loaded, folder)
+            cache.store(loaded, cache_folder)
     if source == FROM_MAP and not len(loaded.signals.kind) and len(loaded.junction_names):
         warnings.warn(_no_signals_advice(path), UserWarning, stacklevel=2)
     if source == SYNTHESISE:
         warnings.warn(_what_was_guessed(path, loaded), UserWarning, stacklevel=2)
     return loaded
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_bytes(path)
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror or error}") from error
 
 
 def _parse(path: Path, text: str, source: str, sidecar: Path | None, key: str) -> Town:

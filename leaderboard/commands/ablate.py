@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from leaderboard.commands.ending import say
+from leaderboard.commands.ending import say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.study_arguments import StudyArguments, run_study
 from leaderboard.running.terminal import Terminal
@@ -77,7 +77,8 @@ class _WhatMatters:
         if worst is None:
             return []
         rows = folder / "rows"
+        named = typed(rows / worst.driven.row.name)
         return [
-            f"Next: driveinsight compare {rows / 'baseline'} {rows / worst.driven.row.name}",
-            f"      driveinsight verify {rows / worst.driven.row.name}       does the claim stand?",
+            f"Next: driveinsight compare {typed(rows / 'baseline')} {named}",
+            f"      driveinsight verify {named}       does the claim stand?",
         ]

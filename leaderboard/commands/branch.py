@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say
+from leaderboard.commands.ending import EXIT_CRASHED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
@@ -64,7 +64,8 @@ class Branch:
         from di_envs.edits.text import EditError
         from di_envs.edits.world import read_world_edits
         from leaderboard.records.chosen_route import RouteChoiceError, chosen_route
-        from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
+        from leaderboard.records.own_files import prepare_folder, take_away
+        from leaderboard.records.results import ResultsError, read_run, write_run
 
         try:
             edits = read_world_edits(self.world)
@@ -88,6 +89,7 @@ class Branch:
                     bar.update(task, completed=int(time_s))
 
                 futures = branch(run, record, self.at, edits, on_step=show)
+            take_away(folder)
             write_run(folder, branch_run(run, futures))
             picture = folder / "branch.png"
             write_branch_picture(picture, run, futures)
@@ -98,7 +100,7 @@ class Branch:
             say("Both futures are the same, to the bit.")
         say(
             f"Written: {picture} and the edited drive beside it.",
-            f"Next: driveinsight verify {folder}",
+            f"Next: driveinsight verify {typed(folder)}",
         )
         return EXIT_CRASHED if futures.edited.lost else 0
 

@@ -23,7 +23,15 @@ from leaderboard.commands.collect import COLLECT_HELP, Collect
 from leaderboard.commands.compare import COMPARE_HELP, Compare
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.edit import EDIT_HELP, Edit
-from leaderboard.commands.ending import EXIT_INTERRUPTED, EXIT_USAGE, UsageError, complain
+from leaderboard.commands.ending import (
+    EXIT_INTERRUPTED,
+    EXIT_PIPE,
+    EXIT_USAGE,
+    UsageError,
+    complain,
+    leave_pipes,
+    say_what_can_be_said,
+)
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.explain import EXPLAIN_HELP, Explain
 from leaderboard.commands.export import EXPORT_HELP, Export
@@ -74,9 +82,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0; 1 if a simulation or a worker process died, or a claim does not stand; 2
-        for a wrong request; 130 if interrupted.
+        for a wrong request; 130 if interrupted; 141 if nobody reads what it prints any more.
     """
-    given = sys.argv[1:] if arguments is None else arguments
+    say_what_can_be_said()
+    try:
+        code = _run(sys.argv[1:] if arguments is None else arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        leave_pipes()
+        return EXIT_PIPE
+    except SystemExit as ending:
+        if isinstance(ending.__context__, BrokenPipeError):  # rich makes one of it
+            leave_pipes()
+            return EXIT_PIPE
+        raise
+    return code
+
+
+def _run(given: Sequence[str]) -> int:
+    """One command, and its exit code."""
+    if empty := _empty(given):
+        complain(empty)
+        return EXIT_USAGE
     commands: Any = Command if given and not given[0].startswith("-") else _briefly(Command)
     command: Command = tyro.cli(commands, prog="driveinsight", description=HELP, args=given)
     try:
@@ -88,6 +115,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UsageError as error:
         complain(str(error))
         return EXIT_USAGE
+
+
+def _empty(given: Sequence[str]) -> str:
+    """What to say of an empty argument, which as a path would be the current folder."""
+    for place, argument in enumerate(given):
+        option = argument.removesuffix("=") if argument.startswith("--") else given[place - 1]
+        if argument == "" or (argument.startswith("--") and argument.endswith("=")):
+            after = f" after {option}" if option.startswith("-") else ""
+            return (
+                f"an argument{after} is empty, as of a shell variable that is not set: give a value"
+                ", or leave it out"
+            )
+    return ""
 
 
 def _briefly(commands: Any) -> Any:

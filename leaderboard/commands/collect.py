@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 from rich.table import Table
 
-from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import check_model
 from leaderboard.running.terminal import Terminal
@@ -114,7 +114,7 @@ class Collect:
             return EXIT_INTERRUPTED
         say(
             f"Written: {self.output / CARD_FILE} and a file for each drive beside it.",
-            f"Next: driveinsight train --config driveinsight --data {self.output}",
+            f"Next: driveinsight train --config driveinsight --data {typed(self.output)}",
         )
         return 0
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.running.terminal import Terminal
 
@@ -51,5 +51,5 @@ class Compare:
         except (ResultsError, PairingError, ValueError) as error:
             raise UsageError(str(error)) from error
         Terminal().print(comparison_tables(comparison))
-        say(f"Next: driveinsight verify {self.second}")
+        say(f"Next: driveinsight verify {typed(self.second)}")
         return 0

@@ -55,6 +55,7 @@ class Drive(SceneArguments):
             interventions=self.edits(),
             isolate=not self.no_isolate,
         )
+        before = self._filmed_ns()
         try:
             if self.video is not None:
                 check_video(self.video)
@@ -68,5 +69,13 @@ class Drive(SceneArguments):
             )
         except (SetupError, VideoError) as error:
             raise UsageError(str(error)) from error
-        say(*record_lines(record), *([] if self.video is None else [f"Written: {self.video}"]))
+        say(*record_lines(record))
+        if self.video is not None:
+            filmed = self._filmed_ns() not in (None, before)
+            say(f"Written: {self.video}" if filmed else f"Nothing was filmed: no {self.video}")
         return EXIT_CRASHED if record.lost else 0
+
+    def _filmed_ns(self) -> int | None:
+        """When the video's file was written; None if there is none."""
+        there = self.video is not None and self.video.is_file()
+        return self.video.stat().st_mtime_ns if self.video is not None and there else None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from leaderboard.commands.ending import say
+from leaderboard.commands.ending import say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.study_arguments import StudyArguments, run_study
 from leaderboard.running.terminal import Terminal
@@ -82,6 +82,5 @@ class _WhatHolds:
         written = write_prompt_editing(folder, study)
         Terminal().print(prompt_editing_tables(study))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
-        return [
-            f"Next: driveinsight verify {folder / 'rows' / 'baseline'}       does the claim stand?"
-        ]
+        baseline = typed(folder / "rows" / "baseline")
+        return [f"Next: driveinsight verify {baseline}       does the claim stand?"]

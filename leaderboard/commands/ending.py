@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import os
+import shlex
+import sys
+from pathlib import Path
+
 from rich.markup import escape
 
 from leaderboard.running.terminal import Terminal
@@ -11,6 +17,7 @@ EXIT_REFUTED = 1  # a claim does not stand
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 LONGEST_LINE = 4000  # characters that a complaint may have
+EXIT_PIPE = 141  # who read the output wants no more, as the shell says it: 128 + SIGPIPE
 
 
 class UsageError(Exception):
@@ -28,3 +35,26 @@ def complain(message: str, kind: str = "[red]error[/red]") -> None:
 def say(*lines: object) -> None:
     """Prints lines on stdout as they are: paths and commands that can be copied whole."""
     Terminal().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)
+
+
+def typed(argument: Path | str) -> str:
+    """A path or another argument as it is typed in a shell, for commands that can be copied."""
+    return shlex.quote(str(argument))
+
+
+def say_what_can_be_said() -> None:
+    """From here on a sign that the terminal's encoding lacks is printed as `?`; no error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors != "backslashreplace":
+            stream.reconfigure(errors="replace")
+
+
+def leave_pipes() -> None:
+    """Writes no more to a pipe that nobody reads, so that Python can end without a word of it."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)

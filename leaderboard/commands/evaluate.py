@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_CRASHED, EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.engine_arguments import EngineArguments
 from leaderboard.commands.scene_arguments import SceneArguments, says
 from leaderboard.running.terminal import Terminal
@@ -75,6 +75,7 @@ class Evaluate(EngineArguments, SceneArguments):
             interventions=self.edits(),
             isolate=not self.no_isolate,
         )
+        new = not folder.exists()
         try:
             with interruptible(ends_process=True):
                 run = evaluate(
@@ -88,7 +89,8 @@ class Evaluate(EngineArguments, SceneArguments):
         except (SetupError, ResultsError) as error:
             raise UsageError(str(error)) from error
         finally:
-            _remove_if_empty(folder)
+            if new:
+                _remove_if_empty(folder)
         _print_run(run, folder)
         if not run.complete:
             return EXIT_INTERRUPTED
@@ -136,10 +138,11 @@ def _print_run(run: RunRecord, folder: Path) -> None:
 
 def _next_steps(run: RunRecord, folder: Path) -> list[str]:
     """Commands that make sense now."""
+    where = typed(folder)
     if run.lost or not run.complete:
-        return [f"Next: the same command with --output {folder} --resume drives what is missing"]
+        return [f"Next: the same command with --output {where} --resume drives what is missing"]
     return [
-        f"Next: driveinsight show {folder}",
-        f"      driveinsight verify {folder}       does the claim stand?",
-        f"      driveinsight compare {folder} OTHER",
+        f"Next: driveinsight show {where}",
+        f"      driveinsight verify {where}       does the claim stand?",
+        f"      driveinsight compare {where} OTHER",
     ]

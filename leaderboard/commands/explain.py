@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
@@ -118,7 +118,8 @@ class Explain:
         if explanation.what_if is None:
             at_s = explanation.record.game_s / 2.0
             say(
-                f"Next: driveinsight explain {folder} --route {self.route} --at {at_s:.1f} "
+                f"Next: driveinsight explain {typed(folder)} --route {typed(self.route)} "
+                f"--at {at_s:.1f} "
                 '--what-if "drop:routing; set:speed=0"'
             )
         return 0

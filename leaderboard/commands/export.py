@@ -82,7 +82,7 @@ class Export:
             return EXIT_INTERRUPTED
         say(
             f"Written: {len(jobs)} shards with {written} moments in {self.output}.",
-            f"Next: read them, such as with webdataset.WebDataset('{jobs[0].path}')",
+            f"Next: read them, such as with webdataset.WebDataset({str(jobs[0].path)!r})",
         )
         return 0
 

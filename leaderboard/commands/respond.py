@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_run
 from leaderboard.running.displays.work_bar import work_bar
@@ -163,11 +163,10 @@ class Respond:
         return list(write_figures(target, name, drive, marked))
 
     def _next(self) -> str:
+        where = typed(self.folder)
         if self.route is None:
-            return f"driveinsight respond {self.folder} --route ID draws one of them"
-        return (
-            f"driveinsight respond {self.folder} --routes all puts the paper's claims to the test"
-        )
+            return f"driveinsight respond {where} --route ID draws one of them"
+        return f"driveinsight respond {where} --routes all puts the paper's claims to the test"
 
 
 def _begins(records: list[RouteRecord]) -> list[float]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from leaderboard.commands.ending import UsageError, say
+from leaderboard.commands.ending import UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.running.terminal import Terminal
 
@@ -37,8 +37,9 @@ class ScoreByRules:
     def run(self) -> int:
         """Scores; returns the exit code."""
         from di_envs.rules import rules_named
+        from leaderboard.records.own_files import prepare_folder
         from leaderboard.records.rescoring import rescored
-        from leaderboard.records.results import ResultsError, prepare_folder, read_run, write_run
+        from leaderboard.records.results import ResultsError, read_run, write_run
         from leaderboard.tables.rescoring_table import rescoring_table
 
         try:
@@ -55,5 +56,5 @@ class ScoreByRules:
         if self.output is None:
             say("Nothing was written: pass --output DIR to keep the run under these rules.")
         else:
-            say(f"Written: {self.output}", f"Next: driveinsight show {self.output}")
+            say(f"Written: {self.output}", f"Next: driveinsight show {typed(self.output)}")
         return 0

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say
+from leaderboard.commands.ending import EXIT_INTERRUPTED, UsageError, say, typed
 from leaderboard.commands.recipe import run_recipe_file
 from leaderboard.commands.scene_arguments import says
 from leaderboard.running.terminal import Terminal
@@ -266,8 +266,8 @@ def _tell_trained(session: Session) -> None:
     policy = folder / POLICY_FOLDER
     training = session.training
     blind = training.policy.config.sensors and not training.config.rendered
+    agent = typed(f"{'true-sight' if blind else 'driveinsight'}:{policy}")
     say(
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
-        f"Next: driveinsight evaluate --agent {'true-sight' if blind else 'driveinsight'}:{policy} "
-        f"--suite town05_tiny",
+        f"Next: driveinsight evaluate --agent {agent} --suite town05_tiny",
     )

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from di_envs.files.caches import cache_folders, writable_cache
 from leaderboard.commands.ending import UsageError
 
 if TYPE_CHECKING:
@@ -71,10 +73,10 @@ def check_model(agent: str, *, trust: bool) -> None:
     path = Path(place.partition("?")[0])
     if scheme != "sb3" or not path.is_file() or _is_own(path):
         return
-    mark = _mark_of(path)
+    mark = hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
     if trust:
         _remember(mark)
-    elif not mark.exists():
+    elif not any((folder / mark).exists() for folder in cache_folders("trusted")):
         raise UsageError(
             f"{path.absolute()} holds pickles, and loading it runs the code in them. If you "
             "trained it, or trust who did, add --trust; it is remembered for this very file"
@@ -87,17 +89,9 @@ def _is_own(path: Path) -> bool:
     return any(path.resolve().is_relative_to((here / name).resolve()) for name in OWN_FOLDERS)
 
 
-def _mark_of(path: Path) -> Path:
-    """The file that is there once a file with such bytes is trusted."""
-    from di_envs.town.cache import cache_folder
-
-    digest = hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
-    return cache_folder().parent / "trusted" / digest
-
-
-def _remember(mark: Path) -> None:
-    try:
-        mark.parent.mkdir(parents=True, exist_ok=True)
-        mark.touch()
-    except OSError:
-        return  # then it is asked again
+def _remember(mark: str) -> None:
+    """Keeps that a file with such bytes is trusted, in a folder that only the user can write."""
+    folder = writable_cache("trusted")
+    if folder is not None:
+        with suppress(OSError):  # then it is asked again
+            (folder / mark).touch()

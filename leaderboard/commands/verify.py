@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from leaderboard.commands.ending import EXIT_REFUTED, UsageError, say
+from leaderboard.commands.ending import EXIT_REFUTED, UsageError, say, typed
 from leaderboard.commands.scene_arguments import says
 from leaderboard.commands.trusting import trusted_edits
 from leaderboard.running.displays.work_bar import work_bar
@@ -82,7 +82,7 @@ class Verify:
         except ReplayError as error:
             raise UsageError(f"{self.path} cannot be replayed here: {error}") from error
         say(*verdict_lines(verdict, run, seen=self.observations))
-        say(f"Next: driveinsight show {self.path}")
+        say(f"Next: driveinsight show {typed(self.path)}")
         return 0 if verdict.stands else EXIT_REFUTED
 
 

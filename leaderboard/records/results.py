@@ -13,7 +13,7 @@ hash of the run's file, so routes of two runs are never counted together.
 from __future__ import annotations
 
 import dataclasses
-import tempfile
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -44,6 +44,7 @@ from leaderboard.records.run_json import (
 CARLA_FILE = "results.json"
 RECORD_FILE = "driveinsight.json"
 ROUTES_FOLDER = "routes"
+ROUTE_FILE = r"[0-9]{4,}\.json"  # a pattern for the names of those in it
 
 _Value = TypeVar("_Value")
 
@@ -54,56 +55,6 @@ class ResultsError(Exception):
 
 class DamagedError(ResultsError):
     """A file of ours that is cut short or garbled."""
-
-
-def prepare_folder(folder: Path, *, overwrite: bool = False, resume: bool = False) -> None:
-    """Makes the folder, and makes sure before any work starts that results can be written there.
-
-    Args:
-        folder: Where the results are to go.
-        overwrite: Take away those of an earlier run.
-        resume: Leave them, to be continued.
-
-    Raises:
-        ResultsError: If it cannot be written to, or holds results and neither is set.
-    """
-    for name in (RECORD_FILE, CARLA_FILE):
-        if (folder / name).exists() and not (overwrite or resume):
-            raise ResultsError(
-                f"{folder} already holds {name}: choose another --output, pass --resume to "
-                "continue that run, or --overwrite to replace it"
-            )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-        _remove_scratch(folder)
-        if overwrite:
-            _remove_results(folder)
-    except OSError as error:
-        raise ResultsError(
-            f"cannot write results to {folder} ({error.strerror}): choose another --output"
-        ) from error
-
-
-def _remove_scratch(folder: Path) -> None:
-    """Takes away what a killed process was writing, and had not finished."""
-    for place in (folder, folder / ROUTES_FOLDER):
-        for path in place.glob(".*.json.*"):
-            path.unlink(missing_ok=True)
-
-
-def _remove_results(folder: Path) -> None:
-    """Takes away an earlier run, its routes last: what is left if that fails is no run at all."""
-    for name in (RECORD_FILE, CARLA_FILE):
-        (folder / name).unlink(missing_ok=True)
-    for path in route_files(folder):
-        path.unlink(missing_ok=True)
-
-
-def route_files(folder: Path) -> list[Path]:
-    """The files of those routes of a run that are finished, by their index."""
-    return sorted((folder / ROUTES_FOLDER).glob("[0-9]*.json"), key=lambda path: int(path.stem))
 
 
 def write_run(folder: Path, run: RunRecord) -> None:
@@ -168,6 +119,13 @@ def _write_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
     }
     text = by_lines({name: compact(value) for name, value in content.items()})
     write_whole(folder / ROUTES_FOLDER / f"{record.index:04d}.json", text)
+
+
+def route_files(folder: Path) -> list[Path]:
+    """The files of those routes of a run that are finished, by their index."""
+    files = (folder / ROUTES_FOLDER).glob("[0-9]*.json")
+    ours = (path for path in files if re.fullmatch(ROUTE_FILE, path.name))
+    return sorted(ours, key=lambda path: int(path.stem))
 
 
 def run_folder(path: Path) -> Path:

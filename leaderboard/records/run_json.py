@@ -90,4 +90,12 @@ def route_from_json(content: Mapping[str, Any], source: str = "route") -> RouteR
         raise JsonError(
             f"{source}: score.driving_score: {given!r} is not the product of the others, {product}"
         )
+    for name, unpacked in (
+        ("controls", record.control_array),
+        ("observation_checks", record.check_array),
+    ):
+        try:
+            unpacked()
+        except ValueError as error:
+            raise JsonError(f"{source}: {name}: {error}") from error
     return record

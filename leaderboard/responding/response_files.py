@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from di_envs.files.json_values import parsed
+from di_envs.files.json_values import from_json, parsed
 from di_envs.files.plain_text import file_name
+from di_envs.files.received import check_array, read_arrays
 from di_envs.files.whole import write_whole
 from leaderboard.responding.drive_responses import DriveResponses
 
@@ -51,10 +54,10 @@ def read_responses(path: Path) -> DriveResponses:
         ResponseFileError: If there are none that this program reads.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            about: dict[str, Any] = parsed(str(file["about"]), "about")
-            arrays = {name: file[name] for name in _ARRAYS}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        content = read_arrays(path)
+        about = from_json(dict[str, Any], parsed(str(content["about"]), "about"), "about")
+        arrays = {name: content[name] for name in _ARRAYS}
+    except (ValueError, KeyError) as error:
         raise ResponseFileError(
             f"{path} holds no responses ({error}): run driveinsight respond again"
         ) from error
@@ -64,7 +67,36 @@ def read_responses(path: Path) -> DriveResponses:
             f"{path} is of format {found}, this program reads {(FORMAT, FORMAT_VERSION)}: run "
             "driveinsight respond again"
         )
-    for name in ("groups", "situations"):
-        about[name] = tuple(about[name])
-    about["events"] = tuple((float(time_s), str(name)) for time_s, name in about["events"])
-    return DriveResponses(**about, **arrays)
+    try:
+        told: dict[str, Any] = vars(from_json(_About, about, "about", complete=True))
+        _check(arrays, len(told["groups"]), len(told["situations"]))
+    except ValueError as error:
+        raise ResponseFileError(
+            f"{path} is damaged ({error}): run driveinsight respond again"
+        ) from error
+    return DriveResponses(**{**told, **arrays})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _About:
+    """What a file holds beside arrays."""
+
+    route_id: str
+    seed: int
+    agent: str
+    drive: str
+    route_hash: str
+    every_s: float
+    events: tuple[tuple[float, str], ...]
+    groups: tuple[str, ...]
+    situations: tuple[str, ...]
+
+
+def _check(arrays: Mapping[str, NDArray[Any]], groups: int, situations: int) -> None:
+    """Refuses arrays of other shapes than their names say; see `DriveResponses`."""
+    moments = len(check_array(arrays, "time_s", "f", (None,), finite=True))
+    check_array(arrays, "speed_mps", "f", (moments,))
+    check_array(arrays, "gradient", "f", (moments, groups, 2))
+    check_array(arrays, "attention", "f", (moments, None, None, groups))
+    check_array(arrays, "waypoints", "f", (moments, None, 2))
+    check_array(arrays, "holds", "b", (moments, situations))

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM ask a run to stop, so that it saves what it has; a second one ends it at once.
+"""Ctrl-C, SIGTERM and SIGQUIT ask a run to stop, so that it saves what it has; a second ends it.
 
 The first signal raises no exception, which could come between a route's end and its file: it is
 noted, and whoever works looks at `requested` now and then. The second one ends a command's process.
@@ -16,7 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Windows has no SIGQUIT
+SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGQUIT") if hasattr(signal, name)
+)
 _SHOW_CURSOR = "\x1b[?25h"  # a progress bar hides it
 
 

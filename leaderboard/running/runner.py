@@ -21,8 +21,9 @@ from rich.console import Console
 from di_envs.suite_files import from_anywhere
 from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.own_files import prepare_folder, take_away
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.records.results import add_route, prepare_folder, start_run
+from leaderboard.records.results import add_route, start_run
 from leaderboard.records.resuming import resumed
 from leaderboard.running.agent_place import drives_apart
 from leaderboard.running.displays.run import RunDisplay
@@ -155,6 +156,8 @@ class _Evaluation:
         run = new_run(self._spec, jobs, self._suite, scene)
         if self._resume:
             run = resumed(self._folder, run)
+        else:  # nothing is there, or what is to be replaced; now that a run can begin
+            take_away(self._folder)
         start_run(self._folder, run)
         done = {record.index for record in run.routes}
         self.run = run

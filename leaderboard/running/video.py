@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -18,6 +19,8 @@ FFMPEG_SUFFIXES = (".mp4", ".mkv", ".mov")
 GIF_SUFFIX = ".gif"
 GIF_WIDTH_PX = 480  # all frames of a GIF are held in memory until it is written
 GIF_FPS = 10.0
+_CODED = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-preset", "veryfast")
+_TRIAL_S = 30.0  # for a program to code one frame
 
 
 class VideoError(Exception):
@@ -50,7 +53,7 @@ def open_video(path: Path, fps: float, ffmpeg: str | None = None) -> VideoWriter
         ffmpeg: The program to use; None looks for it.
 
     Raises:
-        VideoError: If the format is unknown, or it needs ffmpeg and there is none.
+        VideoError: If the format is unknown, or it needs ffmpeg and there is none that works.
     """
     program = ffmpeg or check_video(path)
     try:
@@ -67,7 +70,7 @@ def check_video(path: Path) -> str | None:
         The ffmpeg program to write it with, None if it needs none.
 
     Raises:
-        VideoError: If the format is unknown, or it needs ffmpeg and there is none.
+        VideoError: If the format is unknown, or it needs ffmpeg and there is none that works.
     """
     suffix = path.suffix.lower()
     if suffix not in (*FFMPEG_SUFFIXES, GIF_SUFFIX):
@@ -77,22 +80,49 @@ def check_video(path: Path) -> str | None:
 
 
 def find_ffmpeg(path: Path) -> str:
-    """The ffmpeg program: that of the package imageio-ffmpeg, else the system's.
+    """An ffmpeg program that works: that of the package imageio-ffmpeg, else the system's.
 
     Raises:
-        VideoError: If there is neither.
+        VideoError: If there is none, or none that works; with what they said.
     """
+    complaints = []
+    for program in _programs():
+        complaint = _tried(program)
+        if not complaint:
+            return program
+        complaints.append(f"; {program} does not work: {complaint}")
+    raise VideoError(
+        f"there is no ffmpeg to write '{path}' with{''.join(complaints)}: pip install "
+        "'driveinsight[video]', or install ffmpeg, or write a GIF: --video "
+        f"{path.with_suffix(GIF_SUFFIX)}"
+    )
+
+
+def _programs() -> Iterator[str]:
     with contextlib.suppress(ImportError, RuntimeError):
         from imageio_ffmpeg import get_ffmpeg_exe
 
-        return str(get_ffmpeg_exe())
-    found = shutil.which("ffmpeg")
-    if found is None:
-        raise VideoError(
-            f"there is no ffmpeg to write '{path}' with: pip install 'driveinsight[video]', or "
-            f"install ffmpeg, or write a GIF: --video {path.with_suffix(GIF_SUFFIX)}"
+        yield str(get_ffmpeg_exe())
+    if found := shutil.which("ffmpeg"):
+        yield found
+
+
+def _tried(program: str) -> str:
+    """What a program complains of when it is to code one frame; nothing if it can."""
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", "64x64", "-r", "1", "-i", "-"]
+    command = [program, "-loglevel", "error", *raw, *_CODED, "-f", "null", "-"]
+    try:
+        done = subprocess.run(
+            command, input=bytes(64 * 64 * 3), capture_output=True, timeout=_TRIAL_S, check=False
         )
-    return found
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    return _last_line(done.stderr) if done.returncode else ""
+
+
+def _last_line(said: bytes) -> str:
+    lines = said.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else "it said nothing"
 
 
 class FfmpegWriter:
@@ -119,18 +149,16 @@ class FfmpegWriter:
 
     def _started(self, width: int, height: int) -> subprocess.Popen[bytes]:
         raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
-        coded = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-preset", "veryfast"]
         even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]  # as yuv420p wants it
         command = [self._program, "-y", "-loglevel", "error", *raw, "-r", f"{self._fps:g}"]
-        command += ["-i", "-", *even, *coded, "-movflags", "+faststart", str(self._path)]
+        command += ["-i", "-", *even, *_CODED, "-movflags", "+faststart", str(self._path)]
         return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=self._said)
 
     def _complaint(self) -> str:
         assert self._process is not None
         self._process.wait()
         self._said.seek(0)
-        lines = self._said.read().decode(errors="replace").strip().splitlines()
-        return f"ffmpeg could not write '{self._path}': {lines[-1] if lines else 'it said nothing'}"
+        return f"ffmpeg could not write '{self._path}': {_last_line(self._said.read())}"
 
     def __enter__(self) -> Self:
         return self

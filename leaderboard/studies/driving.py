@@ -8,6 +8,7 @@ already is kept, so repeating a command goes on, and more seeds or rows add to w
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,9 +16,11 @@ from pathlib import Path
 
 from rich.console import Console
 
+from di_envs.files.whole import unfinished
 from di_envs.suites import Suite
-from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.folder_lock import LOCK_FILE, folder_lock
 from leaderboard.records.footing import record_differences
+from leaderboard.records.own_files import refuse_others
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import RECORD_FILE, DamagedError, read_head
 from leaderboard.records.resuming import resumed
@@ -93,6 +96,7 @@ def drive_study(
     """
     console = console or Terminal(stderr=True)
     with folder_lock(folder), interruptible() as interruption:
+        _check_folder(folder)
         earlier = _earlier(folder)
         with compile_progress(console):
             scene, reasons = look_ahead(plan.spec, plan.rows)
@@ -105,6 +109,14 @@ def drive_study(
                 if interruption.requested:
                     break
         return driving.study(), interruption.requested
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuses a folder that holds neither a study, nor runs of one, but something else."""
+    baseline = folder / ROWS_FOLDER / BASELINE / RECORD_FILE
+    if not ((folder / STUDY_FILE).exists() or baseline.exists()):
+        left = {folder / LOCK_FILE, *unfinished(folder, re.escape(STUDY_FILE))}
+        refuse_others(folder, [path for path in folder.iterdir() if path not in left])
 
 
 def _earlier(folder: Path) -> Study | None:

@@ -8,10 +8,10 @@ the two is there whole.
 from __future__ import annotations
 
 import dataclasses
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from leaderboard.records.own_files import remove_run
 from leaderboard.records.record import RunRecord
 from leaderboard.records.results import write_run
 from leaderboard.running.jobs import plan_jobs
@@ -36,13 +36,13 @@ def with_seeds(run: RunRecord, route_ids: Sequence[str], seeds: Sequence[int]) -
 
 
 def replace_run(folder: Path, run: RunRecord) -> None:
-    """Puts a run in the place of the one that the folder holds."""
+    """Puts a run in the place of the one that the folder holds; what else is there stays there."""
     new, old = _beside(folder, "new"), _beside(folder, "old")
     recover_run(folder)
     write_run(new, run)
     folder.rename(old)
     new.rename(folder)
-    shutil.rmtree(old)
+    _clear_up(old, folder)
 
 
 def recover_run(folder: Path) -> None:
@@ -52,7 +52,17 @@ def recover_run(folder: Path) -> None:
         old.rename(folder)
     for leftover in (new, old):
         if leftover.is_dir():
-            shutil.rmtree(leftover)
+            _clear_up(leftover, folder)
+
+
+def _clear_up(leftover: Path, folder: Path) -> None:
+    """Removes a run's files with the folder that they were in; moves what else it holds on."""
+    remove_run(leftover)
+    for path in list(leftover.iterdir()):
+        if not (folder / path.name).exists():
+            path.rename(folder / path.name)
+    if not any(leftover.iterdir()):
+        leftover.rmdir()
 
 
 def _beside(folder: Path, what: str) -> Path:

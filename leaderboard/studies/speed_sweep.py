@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from rich.console import Console
 
 from agents.one_thread import one_thread
 from agents.processes import in_order, processes
-from di_envs.files.json_values import JsonError, one_line, read_json
+from di_envs.files.json_values import JsonError, from_json, one_line, read_json
 from di_envs.files.whole import write_whole
 from leaderboard.records.record import RouteRecord
 from leaderboard.records.results import read_run
@@ -161,8 +162,27 @@ def _kept(folder: Path, record: RouteRecord) -> Lengths | None:
         return None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         return None
+    try:
+        answer = from_json(_Answer, content, "answer", foreign=True)
+        asked = [from_json(tuple[float, ...], content.get(name), name) for name in TARGETS]
+    except JsonError:
+        return None
+    whole = answer.unedited_m is not None and all(len(each) == len(DOSES_MPS) for each in asked)
+    if answer.moments and not whole:
+        return None
     same = content.get("episode") == record.state_hash
     return content if same and content.get("doses_mps") == list(DOSES_MPS) else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Answer:
+    """What is read of a file of answers."""
+
+    episode: str
+    route_hash: str
+    moments: int
+    unedited_m: float | None
+    doses_mps: tuple[float, ...]
 
 
 def _path(folder: Path, record: RouteRecord) -> Path:

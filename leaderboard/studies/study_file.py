@@ -17,7 +17,7 @@ from di_envs.files.json_values import (
     read_document,
     to_json,
 )
-from di_envs.files.plain_text import file_name
+from di_envs.files.plain_text import file_name, one_plain_line
 from di_envs.files.whole import write_whole
 from leaderboard.studies import StudyError
 from leaderboard.studies.record import DrivenRow, Study, StudyDrive
@@ -92,7 +92,8 @@ def _study_from_json(content: dict[str, Any], source: str) -> Study:
     )
     if set(columns) != set(_DRIVE):
         raise JsonError(
-            f"{source}: drive_columns: expected {', '.join(_DRIVE)}, got {', '.join(columns)}"
+            f"{source}: drive_columns: expected {', '.join(_DRIVE)}, got "
+            f"{one_plain_line(', '.join(columns))}"
         )
     rows = from_json(tuple[_Row, ...], content.pop("rows", None), source, "rows", complete=True)
     study = from_json(Study, {**content, "rows": []}, source, complete=True)

@@ -31,6 +31,12 @@ def run_python(code: str, *first_on_path: Path) -> subprocess.CompletedProcess[s
     )
 
 
+def run_command(command: list[str], *first_on_path: Path) -> subprocess.CompletedProcess[str]:
+    """Runs a command as the console script does."""
+    code = f"import sys, driveinsight; sys.argv[1:] = {command}; driveinsight.main()"
+    return run_python(code, *first_on_path)
+
+
 def test_importing_di_envs_leaves_heavy_packages_alone():
     code = (
         "import sys, time; start = time.perf_counter(); import di_envs;"
@@ -88,6 +94,31 @@ def test_another_package_of_our_name_is_refused_with_both_places(tmp_path, name)
     assert f"ImportError: `{name}` is DriveInsight's package at {TOP / name}" in done.stderr
     assert str(other) in done.stderr
     assert "PYTHONPATH" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["agents", "leaderboard"])
+@pytest.mark.parametrize("command", [["agents"], ["suites"], ["evaluate", "--agent", "expert"], []])
+def test_every_command_says_which_path_to_put_first_where_carlas_package_is(
+    tmp_path, name, command
+):
+    other = tmp_path / name
+    other.mkdir()
+    (other / "__init__.py").write_text("")
+    done = run_python(
+        f"import sys, driveinsight; sys.argv[1:] = {command}; driveinsight.main()", tmp_path
+    )
+    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
+    assert f"another one comes first: {other}" in done.stderr
+    assert f"PYTHONPATH={TOP}:$PYTHONPATH driveinsight" in done.stderr
+
+
+def test_with_ours_first_on_the_path_carlas_package_is_not_in_the_way(tmp_path):
+    (tmp_path / "agents").mkdir()
+    (tmp_path / "agents" / "__init__.py").write_text("")
+    done = run_python(
+        "import sys, driveinsight; sys.argv[1:] = ['agents']; driveinsight.main()", TOP, tmp_path
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_folder_of_our_name_that_is_no_package_hides_nothing(tmp_path):

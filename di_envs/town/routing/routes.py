@@ -17,6 +17,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.files.received import read_bytes
 from di_envs.town.plan import PERCENTAGE, WEATHER_PARAMETERS
 from di_envs.town.plan import RouteWeather as RouteWeather  # from here, too
 
@@ -145,12 +146,12 @@ def write_routes(path: str | Path, routes: Iterable[RouteSpec], layout: Layout =
 
 def _root_of(path: Path) -> ET.Element:
     try:
-        return ET.parse(path).getroot()
+        return ET.fromstring(read_bytes(path))
     except FileNotFoundError:
         raise RouteFileError(f"{path}: there is no such route file; check the path.") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise RouteFileError(f"{path}: the route file cannot be read: {error}.") from error
-    except ET.ParseError as error:
+    except (ET.ParseError, ValueError, LookupError) as error:  # some of an odd encoding
         raise RouteFileError(
             f"{path}: expected CARLA route XML, but it is not well-formed: {error}."
         ) from error

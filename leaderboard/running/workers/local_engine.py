@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from typing import Protocol
 
-from leaderboard.running.jobs import Job, RunSpec
+from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.messages import Compiling, Driven, EngineEvent, RunFacts, WorkerMessage
 from leaderboard.running.wall_clock import Limits
 from leaderboard.running.workers.scheduler import PAUSE_S, Scheduler
@@ -69,8 +69,18 @@ class _Processes:
         self._waiting: dict[WorkerProcess, RunFacts | None] = {}
 
     def hire(self, scene: RunFacts | None) -> WorkerProcess:
-        """Starts a process."""
-        worker = WorkerProcess(self._spec, self._limits)
+        """Starts a process.
+
+        Raises:
+            SetupError: If the system allows no more.
+        """
+        try:
+            worker = WorkerProcess(self._spec, self._limits)
+        except OSError as error:
+            raise SetupError(
+                f"cannot start a process to drive in ({error.strerror}): pass fewer --workers, or "
+                "allow more open files and processes (ulimit -n, ulimit -u)"
+            ) from error
         self._waiting[worker] = scene
         self._let_begin()
         return worker

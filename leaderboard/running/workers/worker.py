@@ -10,6 +10,7 @@ import faulthandler
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,10 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
     """
     faulthandler.enable()  # a crash inside a library says on stderr which line led to it
     with open(where, "w", encoding="utf-8") as place:
-        where.unlink()  # the parent has it open: nothing is left behind, whatever happens
-        faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
+        with suppress(OSError):  # Windows removes no file that is open
+            where.unlink()  # the parent has it open: nothing is left behind, whatever happens
+        if WHERE_SIGNAL:
+            faulthandler.register(WHERE_SIGNAL, file=place, all_threads=False)
         live_for_parent()
         watch = Stopwatch(cells, place=place.fileno())
         try:
@@ -40,7 +43,8 @@ def serve(connection: Connection, cells: Any, spec: RunSpec, where: Path) -> Non
         except (EOFError, BrokenPipeError, ConnectionResetError):
             pass  # the parent wants no more
         finally:
-            faulthandler.unregister(WHERE_SIGNAL)
+            if WHERE_SIGNAL:
+                faulthandler.unregister(WHERE_SIGNAL)
 
 
 def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:

@@ -14,13 +14,13 @@ from rich.console import Console
 
 from di_envs.world.state import EventKind
 from leaderboard.records.carla.results import carla_results
+from leaderboard.records.own_files import prepare_folder, take_away
 from leaderboard.records.record import LOST, RouteRecord, RunRecord
 from leaderboard.records.results import (
     CARLA_FILE,
     RECORD_FILE,
     DamagedError,
     ResultsError,
-    prepare_folder,
     read_run,
     write_run,
 )
@@ -374,6 +374,7 @@ def test_routes_of_another_run_are_refused(tmp_path):
 def test_overwriting_takes_all_routes_of_the_earlier_run_away(tmp_path):
     write_run(tmp_path, run_of(RED, route(route_id="8", index=1)))
     prepare_folder(tmp_path, overwrite=True)
+    take_away(tmp_path)
     write_run(tmp_path, run_of(RED, agent="highway"))
     assert len(read_run(tmp_path).routes) == 1
 

@@ -226,6 +226,26 @@ def test_without_ffmpeg_the_error_says_what_to_do(monkeypatch, capsys):
     assert "--video films/one.gif" in line
 
 
+@pytest.mark.parametrize(
+    "says", ["echo Unknown encoder libx264 >&2; exit 1", "exit 3", "kill -9 $$"]
+)
+def test_an_ffmpeg_that_does_not_work_is_told_before_anything_is_driven(
+    says, monkeypatch, capsys, tmp_path
+):
+    program = tmp_path / "ffmpeg"
+    program.write_text(f"#!/bin/sh\n{says}\n")
+    program.chmod(0o755)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(shutil, "which", lambda _name: str(program))
+    film = tmp_path / "one.mp4"
+    assert main([*TOY, "--agent", "expert", "--video", str(film)]) == EXIT_USAGE
+    printed = capsys.readouterr()
+    said = "Unknown encoder libx264" if "echo" in says else "it said nothing"
+    assert f"{program} does not work: {said}: pip install" in printed.err
+    assert "Written" not in printed.out
+    assert not film.exists()
+
+
 def test_a_gif_needs_no_ffmpeg(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(shutil, "which", lambda _name: None)

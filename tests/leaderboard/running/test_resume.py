@@ -16,8 +16,9 @@ from benchmarks.kill_and_resume import contents, finish, start_and_kill
 from di_envs.suites import load_suite
 from di_envs.world_version import WORLD_VERSION
 from leaderboard.records.folder_lock import folder_lock
+from leaderboard.records.own_files import prepare_folder
 from leaderboard.records.record import WORKER_DIED, RunRecord
-from leaderboard.records.results import ResultsError, prepare_folder, read_run, start_run, write_run
+from leaderboard.records.results import ResultsError, read_run, start_run, write_run
 from leaderboard.records.resuming import resumed as continued
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.runner import Existing, evaluate
@@ -74,7 +75,9 @@ def test_what_is_there_is_kept_and_the_rest_is_driven(whole, copy):
     before = (copy / "routes" / "0002.json").stat().st_mtime_ns
     (copy / "routes" / "0001.json").unlink()
     (copy / "results.json").unlink()
-    (copy / ".driveinsight.json.x1").write_text("what a killed process was writing")
+    (copy / ".driveinsight.json.k3j_x1zz.unfinished").write_text(
+        "what a killed process was writing"
+    )
     resumed(copy)
     assert contents(copy) == contents(whole)
     assert (copy / "routes" / "0002.json").stat().st_mtime_ns == before
