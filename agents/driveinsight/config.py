@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from agents.networks.grid import WIDE_GRID, GridConfig
+from agents.networks.sizes import LARGEST, check_sizes
 from di_envs.config import check_name
 from di_envs.files.json_values import from_json, to_json
 from di_envs.prompt import COMPONENTS
@@ -41,22 +42,6 @@ DROPOUT: Mapping[str, float] = MappingProxyType(
 # ... and some together: what a policy that is told nothing of the world must do without. Each of
 # obstacles x bev is hidden in a tenth of the samples at least: .55 x .2 both, .45 x .2 bev alone.
 TOGETHER: Mapping[str, float] = MappingProxyType({"map+obstacles+traffic_lights+stop_signs": 0.5})
-
-
-LARGEST = 4096  # of any number that sizes a network: more is a slip, and would take all memory
-
-
-def check_sizes(config: Any, *names: str) -> None:
-    """Refuses sizes of which no network is made.
-
-    Raises:
-        ValueError: Names the first that is not from 1 to `LARGEST`.
-    """
-    for name in names:
-        value = getattr(config, name)
-        for size in value if isinstance(value, tuple | list) else (value,):
-            if not 1 <= size <= LARGEST:
-                raise ValueError(f"{name} must be from 1 to {LARGEST}, not {size}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +158,9 @@ class PlannerConfig:
     together: Mapping[str, float] = field(default_factory=lambda: TOGETHER)
 
     def __post_init__(self) -> None:
-        check_sizes(self, "width", "heads", "layers", "bev_tokens", "waypoints")
+        check_sizes(self, "width", "heads", "layers", "waypoints")
+        if not 0 <= self.mixing_layers <= LARGEST:
+            raise ValueError(f"mixing_layers must be from 0 to {LARGEST}, not {self.mixing_layers}")
         if not self.waypoint_dt_s > 0.0:
             raise ValueError(f"waypoint_dt_s must be positive, not {self.waypoint_dt_s:g}")
         if self.width % self.heads:
@@ -215,7 +202,6 @@ class PolicyConfig:
         object.__setattr__(self, "prompt", tuple(self.prompt))
         for name in self.prompt:
             check_name(name, COMPONENTS, "prompt component")
-        check_sizes(self, "bev_width")
         if not 0 <= self.memory_frames <= LARGEST:
             raise ValueError(f"memory_frames must be from 0 to {LARGEST}, not {self.memory_frames}")
         if not self.memory_dt_s > 0.0:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agents.networks.sizes import check_sizes
+
 
 @dataclass(frozen=True, kw_only=True)
 class GridConfig:
@@ -21,6 +23,7 @@ class GridConfig:
     cells: int = 48  # along x and along y
 
     def __post_init__(self) -> None:
+        check_sizes(self, "cells")
         for axis in "xyz":
             low, high = getattr(self, f"{axis}_min_m"), getattr(self, f"{axis}_max_m")
             if not low < high:
