@@ -19,7 +19,7 @@ from agents import AgentSpecError, load_agent
 from agents.base import Agent, Requirements
 from agents.faults import agents_code, as_control, describe
 from agents.generators import generators
-from agents.processes import end_with_parent, live_for_parent
+from agents.processes import leave_warnings_to_parent, live_for_parent
 from agents.shared_arrays import Receiver
 from di_envs.edits.text import EditError, read_edit
 from di_envs.files.plain_text import one_plain_line
@@ -39,13 +39,13 @@ def serve(connection: Connection, place: int | None, where_signal: int) -> None:
             None for nowhere.
         where_signal: Number of that signal.
     """
-    end_with_parent()
     live_for_parent()
     faulthandler.enable()
     if place is not None and where_signal:
         faulthandler.register(where_signal, file=place, all_threads=False)
     met: list[str] = []
     warnings.simplefilter("default", UserWarning)
+    leave_warnings_to_parent()  # said last, it goes before
     warnings.showwarning = lambda message, *_, **__: met.append(one_plain_line(str(message)))
     with generators() as drawn:
         hosted = _Hosted(connection, drawn.begin)

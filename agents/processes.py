@@ -142,7 +142,7 @@ def ctrl_c_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def end_with_parent() -> None:
+def _end_with_parent() -> None:
     """In a child: the system kills it as its parent ends, even if its code holds Python's lock.
 
     On Linux; elsewhere `live_for_parent` has to do.
@@ -158,8 +158,15 @@ def end_with_parent() -> None:
 def how_it_ended(exitcode: int | None) -> str:
     """What became of a process that is no more, as the end of a sentence."""
     if exitcode is not None and exitcode < 0:
-        return f"was killed by {signal.Signals(-exitcode).name}"
+        return f"was killed by {_signal_name(-exitcode)}"
     return f"ended by itself with exit code {exitcode}"
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # of those for real time only the first and the last have names
+        return f"signal {number}"
 
 
 def leave_warnings_to_parent() -> None:
@@ -172,7 +179,7 @@ def live_for_parent() -> None:
     for number in _FROM_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
     leave_warnings_to_parent()
-    end_with_parent()
+    _end_with_parent()
     parent = multiprocessing.parent_process()
     if parent is None:
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from di_envs.files.plain_text import plain
 from di_envs.files.whole import write_whole
 from leaderboard.pages.ablation_picture import write_ablation_picture
 from leaderboard.pages.prompt_pictures import write_prompt_picture
@@ -47,7 +48,7 @@ def write_ablation(folder: Path, ablation: Ablation) -> list[Path]:
     picture, table = folder / PICTURE_FILE, folder / TABLE_FILE
     try:
         drawn = write_ablation_picture(picture, ablation)
-        write_whole(table, ablation_markdown(ablation, PICTURE_FILE if drawn else ""))
+        write_whole(table, plain(ablation_markdown(ablation, PICTURE_FILE if drawn else "")))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [table, picture] if drawn else [table]
@@ -75,7 +76,7 @@ def write_prompt_editing(folder: Path, study: Study) -> list[Path]:
                 lines += [f"![{experiment.title}]({picture.name})", ""]
         lines += [f"- {line}" for line in missing_lines(study)]
         lines += ["", *table_lines(ablation)]
-        write_whole(folder / TABLE_FILE, "\n".join(lines))
+        write_whole(folder / TABLE_FILE, plain("\n".join(lines)))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [folder / TABLE_FILE, *written]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rich.markup import escape
 from rich.table import Table
 
+from di_envs.files.plain_text import plain
 from leaderboard.tables.markdown_table import markdown_table
 
 
@@ -47,4 +48,5 @@ class TextTable:
         """For a document."""
         rule = [":--" if place < self.words else "--:" for place in range(len(self.columns))]
         lines = [f"### {self.title}", "", *markdown_table(self.columns, self.rows, rule)]
-        return "\n".join([*lines, "", *(f"{note}  " for note in self.notes)]).rstrip() + "\n"
+        text = "\n".join([*lines, "", *(f"{note}  " for note in self.notes)])
+        return plain(text.rstrip()) + "\n"

@@ -12,11 +12,23 @@ from pathlib import Path
 
 import pytest
 
-from agents.processes import in_order, processes
+from agents.processes import how_it_ended, in_order, processes
 from tests.agents import jobs_of_processes as jobs
 
 TOP = Path(__file__).parents[2]
 PATIENCE_S = 60.0
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (3, "ended by itself with exit code 3"),
+        (-signal.SIGKILL, "was killed by SIGKILL"),
+        (-35, "was killed by signal 35"),
+    ],
+)
+def test_it_is_said_how_a_process_ended_even_by_a_signal_without_a_name(code, said):
+    assert how_it_ended(code) == said
 
 
 class Noted:

@@ -63,7 +63,7 @@ TINY = PolicyConfig(
     camera=None,
     lidar=None,
     memory_frames=0,
-    planner=PlannerConfig(width=8, heads=2, layers=1, bev_tokens=2, waypoints=2),
+    planner=PlannerConfig(width=8, heads=2, layers=1, waypoints=2),
 )
 _DRIVES = (drive("0"), drive("1"))
 _TRIGGER = PlacedScenario(3, 1.0, 2.0, 0.0, 0.5)

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from agents.processes import live_for_parent
+from agents.processes import leave_warnings_to_parent, live_for_parent
 from leaderboard.running.jobs import Job, RunSpec, SetupError
 from leaderboard.running.wall_clock import WHERE_SIGNAL, Doing, Stopwatch
 
@@ -66,6 +66,7 @@ def _work(connection: Connection, watch: Stopwatch, spec: RunSpec) -> None:
     requires = connection.recv()
     with compile_events(compiling), warnings.catch_warnings():
         warnings.simplefilter("default", UserWarning)
+        leave_warnings_to_parent()  # said last, it goes before
         warnings.showwarning = lambda message, *_, **__: tell(Warned(text=str(message)))
         try:
             driver = set_up(spec, watch, requires)
