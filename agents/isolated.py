@@ -62,8 +62,9 @@ class AgentProcess:
         self.stop()
         self._connection, theirs = FRESH.Pipe()
         with ctrl_c_blocked(), contextlib.closing(theirs):
-            asked = self._place is not None and self._where_signal
-            place = _OpenFile(self._place) if asked else None
+            place = None
+            if self._place is not None and self._where_signal:
+                place = _OpenFile(self._place)
             self._process = FRESH.Process(target=serve, args=(theirs, place, self._where_signal))
             self._process.start()
         self._arrays = Sender(self._connection, self.id)

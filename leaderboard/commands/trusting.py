@@ -12,7 +12,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from di_envs.files.caches import cache_folders, writable_cache
 from leaderboard.commands.ending import UsageError
 
 if TYPE_CHECKING:
@@ -73,6 +72,8 @@ def check_model(agent: str, *, trust: bool) -> None:
     path = Path(place.partition("?")[0])
     if scheme != "sb3" or not path.is_file() or _is_own(path):
         return
+    from di_envs.files.caches import cache_folders
+
     mark = hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
     if trust:
         _remember(mark)
@@ -91,6 +92,8 @@ def _is_own(path: Path) -> bool:
 
 def _remember(mark: str) -> None:
     """Keeps that a file with such bytes is trusted, in a folder that only the user can write."""
+    from di_envs.files.caches import writable_cache
+
     folder = writable_cache("trusted")
     if folder is not None:
         with suppress(OSError):  # then it is asked again

@@ -30,7 +30,7 @@ def single():
 
 
 def wrapped():
-    env = gymnasium.make("DriveInsight-Toy-v0", max_episode_steps=12, **QUICK)
+    env = gymnasium.make("DriveInsight-Toy-v1", max_episode_steps=12, **QUICK)
     return FrameStackObservation(PedalWrapper(env), 2)
 
 
@@ -39,7 +39,7 @@ def vector():
 
 
 def wrapped_vector():
-    return RecordEpisodeStatistics(gymnasium.make_vec("DriveInsight-Toy-v0", num_envs=2, **QUICK))
+    return RecordEpisodeStatistics(gymnasium.make_vec("DriveInsight-Toy-v1", num_envs=2, **QUICK))
 
 
 def parallel():

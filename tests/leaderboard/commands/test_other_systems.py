@@ -34,10 +34,10 @@ if __name__ == "__main__":
 """
 DRIVES = """
 import numpy, gymnasium, di_envs
-env = gymnasium.make("DriveInsight-Toy-v0", observations=("prompt",), traffic=2, walkers=1)
+env = gymnasium.make("DriveInsight-Toy-v1", observations=("prompt",), traffic=2, walkers=1)
 env.reset(seed=1)
 env.step(numpy.zeros(3, numpy.float32))
-many = gymnasium.make_vec("DriveInsight-Toy-v0", num_envs=2, observations=("prompt",))
+many = gymnasium.make_vec("DriveInsight-Toy-v1", num_envs=2, observations=("prompt",))
 many.reset(seed=1)
 many.step(numpy.zeros((2, 3), numpy.float32))
 many.close()

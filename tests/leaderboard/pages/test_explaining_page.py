@@ -40,7 +40,7 @@ def test_a_decision_is_looked_at_and_its_weights_are_shuffled(capsys):
 def test_a_recorded_drive_is_looked_into(capsys):
     torch.manual_seed(0)
     save_pretrained(Policy(config_named("tiny")), Path("policy"), "a card")
-    write_run(Path("results/small"), short_run("driveinsight:policy", 6, traffic=0, walkers=0))
+    write_run(Path("results/mine"), short_run("driveinsight:policy", 6, traffic=0, walkers=0))
     exec(RETRACE, {})
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["0.0", "0.5"]
 

@@ -60,7 +60,7 @@ def test_a_machine_whose_weights_are_others_is_refused(tmp_path):
     for weights in (b"these", b"those"):
         (tmp_path / "weights.safetensors").write_bytes(weights)
         footings.append(footing_of_driver(f"driveinsight:{tmp_path}"))
-    with pytest.raises(SetupError, match=r"driveinsight 1, files .*, not driveinsight 1"):
+    with pytest.raises(SetupError, match=r"driveinsight 2, files .*, not driveinsight 2"):
         check_footing(*footings)
 
 
