@@ -21,7 +21,7 @@ from di_envs.files.plain_text import file_name, one_plain_line
 from di_envs.files.whole import write_whole
 from leaderboard.studies import StudyError
 from leaderboard.studies.record import DrivenRow, Study, StudyDrive
-from leaderboard.studies.rows import BASELINE, Row
+from leaderboard.studies.rows import BASELINE, NULL, Row
 
 STUDY_FILE = "study.json"
 FORMAT, FORMAT_VERSION = "driveinsight-study", 2
@@ -100,8 +100,9 @@ def _study_from_json(content: dict[str, Any], source: str) -> Study:
     driven = tuple(
         row.driven(columns, source, f"rows[{number}]") for number, row in enumerate(rows)
     )
-    if not any(row.row.name == BASELINE for row in driven):
-        raise JsonError(f"{source}: rows: none is named '{BASELINE}'; every study has one")
+    for name in (BASELINE, NULL):
+        if not any(row.row.name == name for row in driven):
+            raise JsonError(f"{source}: rows: none is named '{name}'; every study has one")
     return dataclasses.replace(study, rows=driven)
 
 

@@ -65,7 +65,7 @@ TINY = PolicyConfig(
     memory_frames=0,
     planner=PlannerConfig(width=8, heads=2, layers=1, waypoints=2),
 )
-_DRIVES = (drive("0"), drive("1"))
+_ROWS = tuple(row(name, drive("0"), drive("1")) for name in ("baseline", "null"))
 _TRIGGER = PlacedScenario(3, 1.0, 2.0, 0.0, 0.5)
 
 
@@ -169,7 +169,7 @@ FORMATS = {
     ),
     "study": Format(
         file="study.json",
-        make=lambda folder: write_study(folder, study(row("baseline", *_DRIVES))),
+        make=lambda folder: write_study(folder, study(*_ROWS)),
         read=read_study,
         refusals=(StudyError,),
     ),
