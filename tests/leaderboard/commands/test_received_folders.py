@@ -13,7 +13,6 @@ import pytest
 from di_envs.files.json_values import JsonError, from_json
 from di_envs.files.plain_text import file_name, one_plain_line, plain
 from di_envs.suites import DATA, load_suite
-from leaderboard.commands import trusting
 from leaderboard.commands.cli import main
 from leaderboard.pages.markup import element, json_script
 from leaderboard.records.record import AGENT_CRASHED
@@ -86,8 +85,7 @@ def test_a_folder_of_ours_is_asked_nothing(here, capsys):
 def test_a_model_with_pickles_is_asked_for_once(here, monkeypatch, capsys):
     cache = here / "cache"
     cache.mkdir()
-    monkeypatch.setattr(trusting, "writable_cache", lambda part: cache)
-    monkeypatch.setattr(trusting, "cache_folders", lambda part: (cache,))
+    monkeypatch.setenv("DRIVEINSIGHT_CACHE", str(cache))
     for path in (Path("model.zip"), Path("results/model.zip")):
         path.parent.mkdir(exist_ok=True)
         with zipfile.ZipFile(path, "w") as archive:
