@@ -5,6 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from di_envs.files.plain_text import one_plain_line
+
+LONGEST_NAME = 200  # characters of a name that are said again
+
 
 def check_name(name: object, known: Iterable[str], what: str) -> None:
     """Refuses a name that is not known.
@@ -14,7 +18,8 @@ def check_name(name: object, known: Iterable[str], what: str) -> None:
     """
     names = list(known)
     if name not in names:
-        raise ValueError(f"Unknown {what} {name!r}; {name_hint(name, names)}.")
+        shown = one_plain_line(repr(name), LONGEST_NAME)
+        raise ValueError(f"Unknown {what} {shown}; {name_hint(name, names)}.")
 
 
 def name_hint(name: object, known: Iterable[str]) -> str:

@@ -372,7 +372,12 @@ def test_unknown_and_empty_rigs_are_refused():
 
 def test_shipped_rigs_have_the_sizes_that_are_documented():
     sizes = {name: {(c.width, c.height) for c in rig.cameras} for name, rig in RIGS.items()}
-    assert sizes == {"small": {(256, 144)}, "paper": {(1600, 900)}, "rl": {(84, 84)}}
+    assert sizes == {
+        "small": {(256, 144)},
+        "driveinsight": {(256, 144), (320, 128)},
+        "paper": {(1600, 900)},
+        "rl": {(84, 84)},
+    }
     assert [camera.name for camera in RIGS["paper"].cameras] == [
         f"camera_{side}" for side in ("front", "left", "right", "back")
     ]
