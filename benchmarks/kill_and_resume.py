@@ -93,7 +93,7 @@ def an_untrained_policy(given: Path) -> None:
     from agents.driveinsight.weights import save_pretrained
 
     torch.manual_seed(0)
-    save_pretrained(Policy(config_named("small-prompt-only")), given / "policy", "")
+    save_pretrained(Policy(config_named("driveinsight-told")), given / "policy", "")
 
 
 def a_run_of_it(given: Path) -> None:
@@ -117,7 +117,7 @@ COMMANDS = {
         again="--resume",
     ),
     "train": Killed(
-        words="train --config small-prompt-only --steps 60 --batch 4 --workers 1 "
+        words="train --config driveinsight-told --steps 60 --batch 4 --workers 1 "
         "--data {given}/data --output {folder} --check-routes 0",
         prepare=some_drives,
     ),
