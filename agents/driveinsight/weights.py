@@ -123,7 +123,7 @@ def weights_digest(folder: Path) -> str:
     return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
 
 
-def take_weights(policy: Policy, folder: Path) -> tuple[list[str], list[str]]:
+def take_weights(policy: Policy, folder: Path, *, only: str = "") -> tuple[list[str], list[str]]:
     """Takes over the tensors of another policy that have the same names and shapes.
 
     The other one may be smaller: a policy that reads the prompt alone can teach its planner and its
@@ -132,6 +132,7 @@ def take_weights(policy: Policy, folder: Path) -> tuple[list[str], list[str]]:
     Args:
         policy: That takes; the rest of it stays as it is.
         folder: Of the other one.
+        only: What the names of these tensors begin with; empty for all.
 
     Returns:
         Names of the tensors taken, and of those of the other policy that find no place.
@@ -139,7 +140,8 @@ def take_weights(policy: Policy, folder: Path) -> tuple[list[str], list[str]]:
     Raises:
         WeightsError: If the folder holds no usable policy, or nothing in it fits.
     """
-    theirs = from_pretrained(folder).state_dict()
+    state = from_pretrained(folder).state_dict()
+    theirs = {name: value for name, value in state.items() if name.startswith(only)}
     ours = policy.state_dict()
     fits = [n for n, value in theirs.items() if n in ours and ours[n].shape == value.shape]
     if not fits:

@@ -10,6 +10,7 @@ from typing import Any
 
 from agents.driveinsight.config import TOKENS
 from agents.driveinsight.losses import LossConfig
+from agents.training.interest import INTEREST
 from agents.training.seen_noise import EyeConfig
 from agents.training.variation import NO_VARIATION, Variation
 from di_envs.config import check_name
@@ -20,6 +21,7 @@ _TOLD = "map+obstacles+traffic_lights+stop_signs"
 PLANNING: Mapping[str, Any] = MappingProxyType(
     {
         "rendered": False,
+        "interest": dict(INTEREST),
         "measured_moments": 512,
         "measured_every": 500,
         "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
@@ -56,6 +58,8 @@ class TrainConfig:
         without: … given all, and without these components, joined by '+'.
         rendered: Whether sensors are; False learns to plan alone, from what truly is in sight.
         eyes: How bad the eyes are that see it.
+        interest: By what there is near the way, how much more often a planner that learns alone is
+            shown a moment; see `interest.reasons`.
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
@@ -82,6 +86,7 @@ class TrainConfig:
     without: tuple[str, ...] = ()
     rendered: bool = True
     eyes: EyeConfig = field(default_factory=EyeConfig)
+    interest: Mapping[str, float] = field(default_factory=dict)
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""

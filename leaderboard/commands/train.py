@@ -55,8 +55,9 @@ class Train:
     """A file that names all stages from nothing to the weights; beside it only --output, --stage,
     --minutes, --list, --workers and --device can be said."""
 
-    stage: Annotated[str | None, says("NAME", "the recipe's last")] = None
-    """With --recipe: the last stage to do."""
+    stage: Annotated[str | None, says("NAME", "all stages")] = None
+    """With --recipe: the stage to come to, with all that it is made of; two calls may do two stages
+    side by side where neither needs the other."""
 
     minutes: Annotated[float | None, says("N", "until it is done")] = None
     """With --recipe: stop after so long as after Ctrl-C, and go on with the next call."""
@@ -139,7 +140,7 @@ class Train:
             return run_recipe_file(
                 self.recipe,
                 self.output or Path("runs") / self.recipe.stem,
-                until=self.stage,
+                goal=self.stage,
                 minutes=self.minutes,
                 listed=self.listed,
                 workers=self.workers,

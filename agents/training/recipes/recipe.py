@@ -107,8 +107,8 @@ class Recipe:
         """After its file."""
         return self.path.stem
 
-    def until(self, name: str | None) -> tuple[Stage, ...]:
-        """The stages up to one of them; all without a name.
+    def needed_for(self, name: str | None) -> tuple[Stage, ...]:
+        """A stage and all that it is made of, in order; all stages without a name.
 
         Raises:
             RecipeError: If there is no such stage; suggests the nearest.
@@ -120,7 +120,10 @@ class Recipe:
             check_name(name, names, "stage")
         except ValueError as error:
             raise RecipeError(f"{self.path}: {error}") from error
-        return self.stages[: names.index(name) + 1]
+        needed = {name}
+        for stage in reversed(self.stages):  # what a stage takes from comes before it
+            needed |= set(stage.inputs) if stage.name in needed else set()
+        return tuple(stage for stage in self.stages if stage.name in needed)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,7 +67,7 @@ def run_recipe(
     output: Path,
     watcher: Watcher,
     *,
-    until: str | None = None,
+    goal: str | None = None,
     machine: Machine | None = None,
     compiling: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> bool:
@@ -77,7 +77,7 @@ def run_recipe(
         recipe: It.
         output: A folder that each stage has its own in.
         watcher: Told of it, and asked whether to stop.
-        until: Name of the last stage; None for all.
+        goal: Name of the stage to come to, with all that it needs; None for all stages.
         machine: What it runs on.
         compiling: Entered around work that may compile kernels.
 
@@ -88,7 +88,7 @@ def run_recipe(
         RecipeError: If a stage there was made otherwise, or has changed since.
         TrainingError, DriveFileError, WeightsError: What a stage cannot go on from.
     """
-    stages = recipe.until(until)
+    stages = recipe.needed_for(goal)
     kitchen = _Kitchen(
         recipe=recipe,
         output=output,

@@ -50,6 +50,7 @@ STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
             takes={
                 "data": Product.DRIVES,
                 "init_from": Product.POLICY,
+                "eyes": Product.POLICY,
                 "seen": Product.SEEN,
             },
             run=run_train,

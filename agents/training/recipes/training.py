@@ -25,6 +25,8 @@ class PlanStage:
         data: Stages whose drives it learns from.
         config: Name of the policy's configuration.
         init_from: Stage whose policy it begins with; empty for fresh weights.
+        eyes: Stage whose policy it takes the eyes of, which planning leaves as they are; empty for
+            those of `init_from`.
         seen: Stages whose eyes have looked at drives: of these it is shown what was seen there.
         steps: Updates of the weights.
         batch: Samples a step.
@@ -35,6 +37,7 @@ class PlanStage:
     data: tuple[str, ...]
     config: str
     init_from: str = ""
+    eyes: str = ""
     seen: tuple[str, ...] = ()
     steps: int = 4000
     batch: int = 128
@@ -109,13 +112,14 @@ class TrainStage:
 def run_train(run: StageRun) -> Made | None:
     """Trains to the last step; the last weights are kept."""
     settings: TrainStage | PlanStage = run.settings
-    init_from = run.takes["init_from"]
+    init_from, eyes = run.takes["init_from"], run.takes.get("eyes", ())
     plan = TrainingPlan(
         policy=config_named(settings.config),
         training=settings.training(run.seed),
         data=run.takes["data"],
         folder=run.folder,
         init_from=init_from[0] / POLICY_FOLDER if init_from else None,
+        eyes=eyes[0] / POLICY_FOLDER if eyes else None,
         device=run.machine.device,
         precision=settings.precision,
         cache=run.folder.parent / _CACHE_FOLDER,

@@ -32,12 +32,15 @@ def test_stages_that_drive_share_no_number(toy):
     assert first == {"first": 0, "more-1": 10_000, "more-2": 20_000}
 
 
-def test_a_part_of_a_recipe_ends_with_the_stage_named(toy):
+def test_a_stage_needs_all_that_it_is_made_of_and_no_more(toy):
     recipe = toy()
-    assert [stage.name for stage in recipe.until("more-1")] == ["first", "sum-0", "more-1"]
-    assert recipe.until(None) == recipe.stages
+    needed = {
+        name: [stage.name for stage in recipe.needed_for(name)] for name in ("more-1", "sum-1")
+    }
+    assert needed == {"more-1": ["more-1"], "sum-1": ["first", "sum-0", "more-1", "sum-1"]}
+    assert recipe.needed_for(None) == recipe.stages
     with pytest.raises(RecipeError, match=r"toy\.toml: Unknown stage 'more'; did you mean 'more-"):
-        recipe.until("more")
+        recipe.needed_for("more")
 
 
 @pytest.mark.parametrize(

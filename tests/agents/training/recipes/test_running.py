@@ -46,7 +46,7 @@ def test_stopped_at_any_moment_it_comes_to_the_same(toy, tmp_path):
 
 
 def test_what_is_done_is_not_done_again(toy, tmp_path):
-    run_recipe(toy(), tmp_path / "run", Watch(), until="sum-1")
+    run_recipe(toy(), tmp_path / "run", Watch(), goal="sum-1")
     watch = Watch()
     assert run_recipe(toy(), tmp_path / "run", watch)
     assert watch.begun == ["more-2", "sum-2"]
@@ -107,7 +107,7 @@ def test_what_a_stage_under_way_was_begun_with_cannot_change_either(toy, tmp_pat
 
 
 def test_in_another_world_nothing_goes_on(toy, tmp_path, monkeypatch):
-    run_recipe(toy(), tmp_path / "run", Watch(), until="first")
+    run_recipe(toy(), tmp_path / "run", Watch(), goal="first")
     monkeypatch.setattr(markers, "WORLD_VERSION", 999)
     with pytest.raises(RecipeError, match=r"world_version was \d+, is 999"):
         run_recipe(toy(), tmp_path / "run", Watch())
@@ -127,16 +127,16 @@ def test_a_setting_newer_than_the_folder_is_taken_for_its_default(toy, tmp_path)
 
 
 def test_inputs_that_have_changed_since_are_refused(toy, tmp_path):
-    run_recipe(toy(), tmp_path / "run", Watch(), until="sum-0")
+    run_recipe(toy(), tmp_path / "run", Watch(), goal="sum-0")
     (tmp_path / "run" / "first" / "toy" / "00001.npz").write_text("7")
-    assert run_recipe(toy(), tmp_path / "run", Watch(), until="more-1")  # does not take them
+    assert run_recipe(toy(), tmp_path / "run", Watch(), goal="more-1")  # does not take them
     with pytest.raises(RecipeError, match="are not those that stage 'first' had made"):
         run_recipe(toy(), tmp_path / "run", Watch())
 
 
 def test_a_stage_deleted_is_done_again_once_what_came_of_it_is_deleted_too(toy, tmp_path):
     folder = tmp_path / "run"
-    run_recipe(toy(), folder, Watch(), until="sum-1")
+    run_recipe(toy(), folder, Watch(), goal="sum-1")
     shutil.rmtree(folder / "more-1")
     with pytest.raises(RecipeError, match=r"'sum-1' in .* was made of 'more-1', which is not"):
         run_recipe(toy(), folder, Watch())
@@ -148,7 +148,7 @@ def test_a_stage_deleted_is_done_again_once_what_came_of_it_is_deleted_too(toy, 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"format": "x"}'], ids=len)
 def test_a_garbled_marker_says_what_to_do(toy, tmp_path, text):
-    run_recipe(toy(), tmp_path / "run", Watch(), until="first")
+    run_recipe(toy(), tmp_path / "run", Watch(), goal="first")
     (tmp_path / "run" / "first" / "stage.json").write_text(text)
     with pytest.raises(RecipeError, match=r"stage\.json: .* delete .*first to do that stage"):
         run_recipe(toy(), tmp_path / "run", Watch())
