@@ -7,8 +7,6 @@ step), so a run that was killed goes on from its checkpoint as if nothing had be
 from __future__ import annotations
 
 import math
-import pickle
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,13 +18,11 @@ from torch import Tensor, nn
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import counts, losses
 from agents.driveinsight.model import Policy
+from agents.training.checkpoints import load_checkpoint, rate_at, save_checkpoint
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
 from agents.training.predictions import look
 from agents.training.samples import Batch, hidden_components, without
-from di_envs.differences import differences
-from di_envs.files.received import check_ordinary
-from di_envs.files.whole import write_whole
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 
 _PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
@@ -65,14 +61,7 @@ class Training:
         """
         if not self.team.first:
             return
-        content = {
-            "policy_config": self.policy.config.to_mapping(),
-            "config": self.config.to_mapping(),
-            "policy": self.policy.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "step": self.step,
-        }
-        write_whole(path, lambda file: torch.save(content, file))
+        save_checkpoint(path, self._asked(), self.policy, self.optimiser, self.step)
 
     def load(self, path: Path) -> None:
         """Goes on from a checkpoint.
@@ -80,31 +69,14 @@ class Training:
         Raises:
             TrainingError: If it is not whole, or of another policy or training.
         """
-        device = next(self.policy.parameters()).device
-        try:
-            check_ordinary(path)
-            content = torch.load(path, weights_only=True, map_location=device)
-            policy, config = content["policy_config"], content["config"]
-        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError, IndexError,
-                AttributeError, pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
-            raise _not_whole(path, error) from error
-        different = [
-            *differences(policy, self.policy.config.to_mapping()),
+        self.step = load_checkpoint(
+            path,
+            self._asked(),
+            self.policy,
+            self.optimiser,
             # what a field did that is newer than the checkpoint is what its default does
-            *differences({**TrainConfig().to_mapping(), **config}, self.config.to_mapping()),
-        ]
-        if different:
-            said = "; ".join(difference.was_is for difference in different)
-            raise TrainingError(
-                f"{path} is of another training ({said}): give the same options "
-                f"to go on with it, or another --output to begin a new one"
-            )
-        try:
-            self.policy.load_state_dict(content["policy"])
-            self.optimiser.load_state_dict(content["optimiser"])
-            self.step = int(content["step"])
-        except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
-            raise _not_whole(path, error) from error
+            defaults=TrainConfig().to_mapping(),
+        )
 
     def update(self, batch: Batch) -> dict[str, float]:
         """One step on a batch, or on a share of it; returns the terms of the whole batch's loss.
@@ -112,18 +84,25 @@ class Training:
         Raises:
             TrainingError: If the loss is not finite: the weights are left as they were.
         """
+        config = self.config
+        rate = rate_at(
+            self.step,
+            highest=config.learning_rate,
+            warm_up=config.warm_up,
+            steps=config.steps,
+        )
         for group in self.optimiser.param_groups:
-            group["lr"] = self._learning_rate() * group["rate"]
+            group["lr"] = rate * group["rate"]
         self.policy.train()
         self.optimiser.zero_grad()
-        hidden = self._hidden(self.config.batch)[self.team.share(self.config.batch)]
+        hidden = self._hidden(config.batch)[self.team.share(config.batch)]
         terms = self._terms(batch, hidden)
         values = self.team.summed(terms)
         if not math.isfinite(values["total"]):
             raise self._diverged(f"loss is {values['total']}")
         terms["total"].backward()
         self.team.sum_gradients(self.policy.parameters())
-        norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.config.clip)
+        norm = torch.nn.utils.clip_grad_norm_(self.policy.parameters(), config.clip)
         if not torch.isfinite(norm):
             raise self._diverged(f"gradient's norm is {float(norm)}")
         self.optimiser.step()
@@ -165,12 +144,9 @@ class Training:
             f"last checkpoint is whole"
         )
 
-    def _learning_rate(self) -> float:
-        config = self.config
-        if self.step < config.warm_up:
-            return config.learning_rate * (self.step + 1) / config.warm_up
-        done = (self.step - config.warm_up) / max(config.steps - config.warm_up, 1)
-        return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * min(done, 1.0)))
+    def _asked(self) -> dict[str, Any]:
+        """What decides what comes out."""
+        return {**self.config.to_mapping(), "policy": self.policy.config.to_mapping()}
 
     def _hidden(self, size: int) -> Tensor:
         """(B, 10) which components are hidden (0) in this step."""
@@ -178,10 +154,6 @@ class Training:
             return torch.ones(size, len(TOKENS))
         key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
         return hidden_components(self.policy.config, size, key)
-
-
-def _not_whole(path: Path, error: Exception) -> TrainingError:
-    return TrainingError(f"{path} is not whole ({error!r}): delete it to begin again")
 
 
 def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:

@@ -7,36 +7,29 @@ is remembered by learns from all that remember it.
 
 from __future__ import annotations
 
-import math
-import pickle
 import time
-import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
-from torch.utils.data import Dataset
 
-from agents.driveinsight.config import PolicyConfig
 from agents.driveinsight.heads import Heads
 from agents.driveinsight.memory import bank_of_sequence
 from agents.driveinsight.model import Policy
 from agents.driveinsight.perception import Perception
 from agents.driveinsight.perception_losses import (
     PerceptionTargets,
-    PerceptionWeights,
     perception_losses,
 )
 from agents.driveinsight.weights import save_pretrained
+from agents.training.checkpoints import load_checkpoint, rate_at, save_checkpoint
 from agents.training.config import TrainingError
-from agents.training.frames import RecordedDrive, read_drive
-from agents.training.loading import Moments as Chosen
-from agents.training.loading import load_moments, rendered, town_of
+from agents.training.loading import load_moments, rendered
 from agents.training.log import append_row, forget_rows_after
 from agents.training.loop import (
     CHECKPOINT_EVERY_S,
@@ -45,125 +38,12 @@ from agents.training.loop import (
     LOG_FILE,
     POLICY_FOLDER,
 )
+from agents.training.perceive_config import PerceiveConfig
+from agents.training.perceive_samples import Sequences, order
 from agents.training.perception_metrics import figures, perception_sums
 from agents.training.predictions import on_device
-from agents.training.sequences import Moments, SequenceRenderer, joined
-from agents.training.variation import Variation
-from di_envs.differences import differences
+from agents.training.sequences import Moments, joined
 from di_envs.files.json_values import to_json
-from di_envs.files.whole import write_whole
-from di_envs.numerics.keyed_random import Stream, keyed_hash
-
-
-@dataclass(frozen=True, kw_only=True)
-class PerceiveConfig:
-    """How eyes are trained.
-
-    Attributes:
-        steps: Updates of the weights.
-        batch: Sequences a step.
-        length: Moments of a sequence, 0.5 s apart; each is supervised.
-        learning_rate: At its highest, after the warm-up; it falls to 0 along a cosine.
-        warm_up: Steps over which it rises.
-        weight_decay: AdamW's.
-        clip: Largest norm of the gradient.
-        seed: Of initial weights and of everything that is drawn.
-        standing_share: Of moments at which the ego stands and will stand, this share is taken.
-        precision: `float32`, or `bfloat16` for products and convolutions (mixed precision).
-        held_out: Share of the drives that is kept out of training, to measure by.
-        measured: Sequences of these that are looked at …
-        measured_every: … after so many steps.
-        variation: How sequences are varied.
-        weights: Of the terms of the loss.
-    """
-
-    steps: int = 4000
-    batch: int = 5
-    length: int = 4
-    learning_rate: float = 2e-3
-    warm_up: int = 200
-    weight_decay: float = 1e-2
-    clip: float = 5.0
-    seed: int = 0
-    standing_share: float = 0.2
-    precision: str = "float32"
-    held_out: float = 0.05
-    measured: int = 100
-    measured_every: int = 500
-    variation: Variation = field(default_factory=Variation)
-    weights: PerceptionWeights = field(default_factory=PerceptionWeights)
-
-    def __post_init__(self) -> None:
-        for name in ("steps", "batch", "length", "measured_every"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-
-    def measured_after(self, step: int) -> bool:
-        """Whether the eyes are measured on drives kept out after so many steps."""
-        return self.held_out > 0.0 and (step % self.measured_every == 0 or step == self.steps)
-
-
-class Sequences(Dataset[Moments]):
-    """Sequences by their number over the whole training: step x batch + place in it.
-
-    Numbers beyond the training's are those that it is measured on: unvaried but for weather, and
-    the same each time.
-    """
-
-    def __init__(self, policy: PolicyConfig, training: PerceiveConfig, chosen: Chosen) -> None:
-        self._policy, self._training, self._all = policy, training, chosen
-        self._taught, kept_out = chosen.held_out(training.held_out)
-        self._measured = kept_out.some(training.measured) if training.held_out else kept_out
-        self._drives: dict[int, RecordedDrive] = {}
-        self._renderers: dict[str, SequenceRenderer] = {}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """For other processes: what it is made from, without what it has read."""
-        return _sequences, (self._policy.to_mapping(), self._training, self._all)
-
-    def __len__(self) -> int:
-        return self._training.steps * self._training.batch
-
-    def __getitem__(self, number: int) -> Moments:
-        training = self._training
-        key = int(keyed_hash(training.seed, int(Stream.AGENT), number, 2)) % 2**62
-        if number < len(self):
-            return self._sequence(self._taught, key % len(self._taught), training.variation, key)
-        unmoved = replace(training.variation, share=0.0)
-        return self._sequence(self._measured, number - len(self), unmoved, key)
-
-    def _sequence(self, chosen: Chosen, row: int, variation: Variation, key: int) -> Moments:
-        number, last = int(chosen.drive[row]), int(chosen.moment[row])
-        if number not in self._drives:
-            self._drives[number] = read_drive(chosen.paths[number])
-        drive = self._drives[number]
-        length = self._training.length
-        return self._renderer(drive).sequence(drive, last, length, variation, key)
-
-    def _renderer(self, drive: RecordedDrive) -> SequenceRenderer:
-        town = str(drive.facts["town"])
-        if town not in self._renderers:
-            depth = self._training.weights.depth > 0.0 and self._policy.camera is not None
-            self._renderers[town] = SequenceRenderer(self._policy, *town_of(drive), depth=depth)
-        return self._renderers[town]
-
-
-def _sequences(policy: Mapping[str, Any], training: PerceiveConfig, chosen: Chosen) -> Sequences:
-    return Sequences(PolicyConfig.from_mapping(policy), training, chosen)
-
-
-def _order(training: PerceiveConfig, first_step: int) -> Iterator[int]:
-    """Numbers of sequences from a step on; after some steps, of those that are measured on."""
-    size, total = training.batch, training.steps * training.batch
-    for step in range(first_step, training.steps):
-        yield from range(step * size, (step + 1) * size)
-        if training.measured_after(step + 1):
-            yield from range(total, total + _measured(training))
-
-
-def _measured(training: PerceiveConfig) -> int:
-    """Sequences that are measured on, in whole batches."""
-    return training.measured // training.batch * training.batch
 
 
 def look(perception: Perception, moments: Moments, length: int) -> tuple[Heads, tuple[Tensor, ...]]:
@@ -228,13 +108,7 @@ class Perceiving:
 
     def save(self, path: Path) -> None:
         """Writes a checkpoint; the old one stays until the new one is whole."""
-        content = {
-            "asked": self._asked(),
-            "policy": self.policy.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "step": self.step,
-        }
-        write_whole(path, lambda file: torch.save(content, file))
+        save_checkpoint(path, self._asked(), self.policy, self.optimiser, self.step)
 
     def load(self, path: Path) -> None:
         """Goes on from a checkpoint.
@@ -242,23 +116,8 @@ class Perceiving:
         Raises:
             TrainingError: If it is not whole, or of another policy or training.
         """
-        try:
-            content = torch.load(path, weights_only=True, map_location=self._device())
-            asked = content["asked"]
-        except (OSError, RuntimeError, EOFError, KeyError, ValueError, TypeError,
-                pickle.UnpicklingError, zipfile.BadZipFile) as error:  # fmt: skip
-            raise TrainingError(
-                f"{path} is not whole ({error!r}): delete it to begin again"
-            ) from error
-        if different := differences(asked, self._asked()):
-            said = "; ".join(difference.was_is for difference in different)
-            raise TrainingError(
-                f"{path} is of another training ({said}): give the same options "
-                f"to go on with it, or another folder to begin a new one"
-            )
-        self.policy.load_state_dict(content["policy"])
-        self.optimiser.load_state_dict(content["optimiser"])
-        self.step = content["step"]
+        asked, defaults = self._asked(), to_json(PerceiveConfig())
+        self.step = load_checkpoint(path, asked, self.policy, self.optimiser, defaults=defaults)
 
     def update(self, moments: Moments) -> dict[str, float]:
         """One step; returns the terms of the loss.
@@ -266,16 +125,21 @@ class Perceiving:
         Raises:
             TrainingError: If the loss is not finite: the weights are left as they were.
         """
+        config = self.config
+        rate = rate_at(
+            self.step,
+            highest=config.learning_rate,
+            warm_up=config.warm_up,
+            steps=config.steps,
+        )
         for group in self.optimiser.param_groups:
-            group["lr"] = self._learning_rate()
+            group["lr"] = rate
         self.perception.train()
         self.optimiser.zero_grad()
         heads, depth, targets = self._look(moments)
-        terms = perception_losses(
-            heads, depth, targets, self.policy.config.grid, self.config.weights
-        )
+        terms = perception_losses(heads, depth, targets, self.policy.config.grid, config.weights)
         terms["total"].backward()
-        norm = torch.nn.utils.clip_grad_norm_(self.perception.parameters(), self.config.clip)
+        norm = torch.nn.utils.clip_grad_norm_(self.perception.parameters(), config.clip)
         if not torch.isfinite(norm):
             raise TrainingError(
                 f"the gradient's norm is {float(norm)} at step {self.step}: try a lower "
@@ -291,7 +155,7 @@ class Perceiving:
         sums, length = Counter[str](), self.config.length
         full = min(self.policy.config.memory_frames, length - 1)
         with torch.no_grad():
-            for _ in range(_measured(self.config) // self.config.batch):
+            for _ in range(self.config.measured_sequences // self.config.batch):
                 heads, _, targets = self._look(next(data))
                 chosen = torch.arange(len(targets.signal)) % length >= full
                 heads, targets = moments_of(heads, chosen), moments_of(targets, chosen)
@@ -308,13 +172,6 @@ class Perceiving:
 
     def _device(self) -> torch.device:
         return next(self.perception.parameters()).device
-
-    def _learning_rate(self) -> float:
-        config = self.config
-        if self.step < config.warm_up:
-            return config.learning_rate * (self.step + 1) / config.warm_up
-        done = (self.step - config.warm_up) / max(config.steps - config.warm_up, 1)
-        return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * min(done, 1.0)))
 
     def _asked(self) -> dict[str, Any]:
         """What decides what comes out."""
@@ -358,7 +215,7 @@ def perceive(
         training.load(checkpoint)
     forget_rows_after(folder / LOG_FILE, training.step)
     sequences = Sequences(policy.config, config, chosen)
-    numbers = _order(config, training.step)
+    numbers = order(config, training.step)
     batches = rendered(sequences, config.batch, numbers, joined, workers=workers)
     with closing(batches):
         _learn(training, batches, folder, tell, stop)

@@ -13,7 +13,8 @@ from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import take_weights
 from agents.training.log import read_rows
 from agents.training.loop import LOG_FILE
-from agents.training.perceiving import PerceiveConfig, perceive
+from agents.training.perceive_config import PerceiveConfig
+from agents.training.perceiving import perceive
 from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
 from agents.training.session import chosen_device, chosen_precision
 

@@ -17,8 +17,8 @@ from agents.training.frames import read_drive
 from agents.training.loading import load_moments, town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, POLICY_FOLDER
+from agents.training.perceive_config import PerceiveConfig
 from agents.training.perceiving import (
-    PerceiveConfig,
     look,
     perceive,
 )
