@@ -152,7 +152,7 @@ def test_a_checkpoint_of_other_options_is_refused_by_name(tmp_path, moments):
         training = Training.begin(PROMPT_ONLY, dataclasses.replace(SHORT, **other), "cpu")
         with pytest.raises(TrainingError, match=f"of another training .{next(iter(other))} was"):
             training.load(tmp_path / CHECKPOINT_FILE)
-    with pytest.raises(TrainingError, match=r"policy\.name was test-prompt-only, is test-seeing"):
+    with pytest.raises(TrainingError, match="policy 'name' was test-prompt-only, is test-seeing"):
         Training.begin(SEEING, SHORT, "cpu").load(tmp_path / CHECKPOINT_FILE)
 
 
