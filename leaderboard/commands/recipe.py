@@ -80,14 +80,16 @@ def _run(recipe: Recipe, output: Path, goal: str | None, machine: Machine, end_s
     from leaderboard.running.displays.recipe import RecipeDisplay
     from leaderboard.running.interruption import interruptible
 
-    with folder_lock(output), interruptible() as interruption:
+    with interruptible() as interruption:
         stages = len(recipe.needed_for(goal))
 
         def stop() -> bool:
             return interruption.requested or monotonic() > end_s
 
         with RecipeDisplay(stages, stop=stop, say=say) as display:
-            return run_recipe(recipe, output, display, goal=goal, machine=machine)
+            return run_recipe(
+                recipe, output, display, goal=goal, machine=machine, alone=folder_lock
+            )
 
 
 def _list(recipe: Recipe, output: Path) -> None:

@@ -70,6 +70,7 @@ def run_recipe(
     goal: str | None = None,
     machine: Machine | None = None,
     compiling: Callable[[], AbstractContextManager[None]] = nullcontext,
+    alone: Callable[[Path], AbstractContextManager[object]] = nullcontext,
 ) -> bool:
     """Does all stages that are not done, in order.
 
@@ -80,6 +81,8 @@ def run_recipe(
         goal: Name of the stage to come to, with all that it needs; None for all stages.
         machine: What it runs on.
         compiling: Entered around work that may compile kernels.
+        alone: Entered around work in a stage's folder: keeps others out of it, who may do another
+            stage meanwhile.
 
     Returns:
         False if it was asked to stop before the end.
@@ -95,6 +98,7 @@ def run_recipe(
         watcher=watcher,
         machine=machine or Machine(),
         compiling=compiling,
+        alone=alone,
     )
     for stage in stages:  # before hours go into the first that is to be done
         kitchen.check(stage)
@@ -112,6 +116,7 @@ class _Kitchen:
     watcher: Watcher
     machine: Machine
     compiling: Callable[[], AbstractContextManager[None]]
+    alone: Callable[[Path], AbstractContextManager[object]]
     digests: dict[str, str] = field(default_factory=dict)
     looked_at: set[str] = field(default_factory=set)
 
@@ -138,11 +143,18 @@ class _Kitchen:
         if self.watcher.stop():
             return False
         self._look_at_inputs(stage)
-        self.watcher.begins(stage, number, of)
         folder = self.output / stage.name
+        with self.alone(folder):
+            return self._do_alone(stage, folder, number, of)
+
+    def _do_alone(self, stage: Stage, folder: Path, number: int, of: int) -> bool:
         inputs = {name: self.digests[name] for name in stage.inputs}
         wanted = Marker.of(stage, self.recipe.seed, inputs)
         clock = _Clock(folder=folder, marker=found_marker(folder, wanted, stage))
+        if clock.marker.done:  # by somebody else, since it was looked at
+            self.digests[stage.name] = clock.marker.digest
+            return True
+        self.watcher.begins(stage, number, of)
         clock.write()
         made = stage.how.run(self._run(stage, clock))
         clock.write()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
+from contextlib import contextmanager
 
 import pytest
 
@@ -111,6 +112,22 @@ def test_in_another_world_nothing_goes_on(toy, tmp_path, monkeypatch):
     monkeypatch.setattr(markers, "WORLD_VERSION", 999)
     with pytest.raises(RecipeError, match=r"world_version was \d+, is 999"):
         run_recipe(toy(), tmp_path / "run", Watch())
+
+
+def test_a_stage_that_another_has_done_meanwhile_is_not_done_again(toy, tmp_path):
+    """Two commands go on with one recipe: the second waits at a folder until the first has left."""
+    folder, others = tmp_path / "run", Watch()
+
+    @contextmanager
+    def alone(stage):
+        if stage.name == "sum-0" and not others.begun:
+            assert run_recipe(toy(), folder, others, goal="sum-0")
+        yield
+
+    watch = Watch()
+    assert run_recipe(toy(), folder, watch, alone=alone)
+    assert others.begun == ["sum-0"]
+    assert watch.begun == [name for name in ALL if name != "sum-0"]
 
 
 def test_a_setting_newer_than_the_folder_is_taken_for_its_default(toy, tmp_path):
