@@ -11,5 +11,6 @@ pyramid.py     feature maps of several scales to the finest
 lift.py        features of pixels, by their depths, to cells
 blocks.py      normalised convolutions, channels that are weighed
 fused.py       normalisation folded into convolutions, for who no longer learns
+weights.py     networks on disk, in float16
 unet.py        a map to one of the same size that has looked far
 """
