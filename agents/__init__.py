@@ -135,6 +135,16 @@ AGENTS: dict[str, AgentEntry] = {
     "roach-raster": _system(
         "roach-raster", "roach_raster:RoachAgent", "Roach: the true view from above, the teacher"
     ),
+    "transfuser": _system(
+        "transfuser", "transfuser:TransfuserAgent", "images and LiDAR joined at several scales"
+    ),
+    "interfuser": _system(
+        "interfuser", "interfuser:InterfuserAgent", "all views in a transformer, safety controller"
+    ),
+    "lbc-teacher": _system(
+        "lbc-teacher", "lbc:LbcAgent", "Learning by Cheating: who sees the truth and teaches lbc"
+    ),
+    "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",

@@ -59,13 +59,22 @@ class PidT:
         """
         (x0, y0), (x1, y1) = waypoints[:2].tolist()
         wanted_mps = 2.0 * math.hypot(x1 - x0, y1 - y0)
+        aim = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
+        return self.towards(aim, wanted_mps, speed_mps, memory)
+
+    def towards(
+        self,
+        aim: tuple[float, float],
+        wanted_mps: float,
+        speed_mps: float,
+        memory: ControllerMemory,
+    ) -> tuple[Control, ControllerMemory]:
+        """The same for a place to steer at, x ahead, y right [m], and a speed."""
         brakes = wanted_mps < self.brake_mps or speed_mps > self.brake_ratio * wanted_mps
         delta = min(max(wanted_mps - speed_mps, 0.0), self.most_delta_mps)
         throttle, speed_errors = pid_step(self.speed, memory.speed, delta)
         throttle = 0.0 if brakes else min(max(throttle, 0.0), self.most_throttle)
-        angle = math.atan2(0.5 * (y0 + y1), 0.5 * (x0 + x1)) / (0.5 * math.pi)
-        if speed_mps < 0.01:
-            angle = 0.0
+        angle = math.atan2(aim[1], aim[0]) / (0.5 * math.pi) if speed_mps >= 0.01 else 0.0
         steer, turn_errors = pid_step(self.turn, memory.turn, angle)
         control = make_control(throttle, steer, float(brakes))
         return control, ControllerMemory(turn=turn_errors, speed=speed_errors)
