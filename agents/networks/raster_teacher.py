@@ -56,7 +56,9 @@ class RasterTeacher(nn.Module):
         before, side = inputs, cells
         for number, channels in enumerate(widths):
             size = 5 if number < 3 else 3
-            self.convs.append(nn.Conv2d(before, channels, size, 2, size // 2))
+            conv = nn.Conv2d(before, channels, size, 2, size // 2)
+            nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")  # no norms keep it going
+            self.convs.append(conv)
             self.taps.append(Tap())
             before, side = channels, -(-side // 2)
         self.view = nn.Sequential(nn.Linear(before * side * side, width), nn.ReLU())

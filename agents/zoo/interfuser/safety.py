@@ -15,10 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SEEN = 0.4  # presence from which a cell's object counts
-BOX_M, ASIDE_M = (
-    1.25,
-    1.2,
-)  # by which boxes are longer at each end, and the way is wide to each side
+BOX_M, ASIDE_M = 1.25, 1.2  # by which boxes are longer at each end, and wider at each side
 WAY_M, STEP_M = 20.0, 0.5  # that are looked at
 MOST_MPS = 5.0
 NEAREST_M = 3.0  # within which somebody on the way stops the car

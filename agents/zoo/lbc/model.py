@@ -1,8 +1,8 @@
 """A teacher that sees the truth says points for any target; a student finds them in its pictures.
 
-Source: Chen et al., Learning by Cheating, CoRL 2019, in its authors' version for the CARLA Challenge of
-2020: both are networks from a map to heatmaps, into which the target is drawn. What we changed: sizes;
-the narrow camera ahead stands among the student's channels.
+Source: Chen et al., Learning by Cheating, CoRL 2019, in its authors' version for the CARLA
+Challenge of 2020: both are networks from a map to heatmaps, into which the target is drawn. What we
+changed: sizes; the narrow camera ahead stands among the student's channels.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ class LbcStudent(SystemModel):
         return terms
 
     def _error(self, places: Tensor, raster: Tensor, target: Tensor) -> Tensor:
-        """L1 between (B, T, 2) places in the picture and the teacher's, in hundredths of its sides."""
+        """L1 of (B, T, 2) places in the picture to the teacher's, in hundredths of its sides."""
         with torch.no_grad():
             shown = share_of_image(self.teacher(raster, target), _FRONT)
         return 100.0 * (places.float() - shown).abs().sum(dim=2).mean()
