@@ -144,6 +144,15 @@ AGENTS: dict[str, AgentEntry] = {
     "lbc-teacher": _system(
         "lbc-teacher", "lbc:LbcAgent", "Learning by Cheating: who sees the truth and teaches lbc"
     ),
+    "ppo": AgentEntry(
+        entry_point="agents.zoo.ppo.agent:PpoAgent",
+        summary="Stable-Baselines3's PPO on prompts: what learns from reward alone",
+        version=1,
+        options={"shipped": "ppo"},
+        data="zoo/ppo/weights/ppo",
+        data_files=("ppo.zip",),
+        packages=("stable-baselines3", "torch"),
+    ),
     "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
