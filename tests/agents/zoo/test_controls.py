@@ -58,9 +58,9 @@ def test_a_car_eleven_metres_ahead_leaves_so_much_of_the_way_free():
     # its back is at 9 m, and boxes are 1.25 m longer: 8 m is the first place met, 7.5 m are free
     assert free_m(way, STANDS, 0.0) == 7.5
     assert free_m(way, np.zeros((0, 6)), 0.0) == WAY_M
-    beside = STANDS + [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]
+    beside = STANDS + np.array([0.0, 3.0, 0.0, 0.0, 0.0, 0.0])
     assert free_m(way, beside, 0.0) == WAY_M
-    drives = STANDS + [0.0, 0.0, 0.0, 0.0, 0.0, 2.0]
+    drives = STANDS + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     assert free_m(way, drives, 1.0) == 9.5
 
 
