@@ -37,9 +37,25 @@ class AgentEntry:
     data: str = ""  # folder beside this file that the agent reads, such as weights
     data_files: tuple[str, ...] = ()  # those of a folder that decide what it does; () for all
     packages: tuple[str, ...] = ()  # whose version can change what it does
+    score: str = ""  # driving score on town05_short, seed 0, of a system of the zoo
 
 
 POLICY_FILES = ("config.json", "weights.safetensors")  # that decide what a policy does
+
+
+def _system(name: str, agent: str, summary: str, *, version: int = 1) -> AgentEntry:
+    """A system of the zoo: its name, `folder:Class` of its driver, and what it is."""
+    folder, _, driver = agent.partition(":")
+    return AgentEntry(
+        entry_point=f"agents.zoo.{folder}.agent:{driver}",
+        summary=summary,
+        version=version,
+        options={"shipped": name},
+        data=f"zoo/{folder}/weights/{name}",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    )
+
 
 AGENTS: dict[str, AgentEntry] = {
     "expert": AgentEntry(
@@ -113,6 +129,31 @@ AGENTS: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "ego-only": _system(
+        "ego-only", "ego_only:EgoOnlyAgent", "AD-MLP: target, command and speed alone, the floor"
+    ),
+    "roach-raster": _system(
+        "roach-raster", "roach_raster:RoachAgent", "Roach: the true view from above, the teacher"
+    ),
+    "transfuser": _system(
+        "transfuser", "transfuser:TransfuserAgent", "images and LiDAR joined at several scales"
+    ),
+    "interfuser": _system(
+        "interfuser", "interfuser:InterfuserAgent", "all views in a transformer, safety controller"
+    ),
+    "lbc-teacher": _system(
+        "lbc-teacher", "lbc:LbcAgent", "Learning by Cheating: who sees the truth and teaches lbc"
+    ),
+    "ppo": AgentEntry(
+        entry_point="agents.zoo.ppo.agent:PpoAgent",
+        summary="Stable-Baselines3's PPO on prompts: what learns from reward alone",
+        version=1,
+        options={"shipped": "ppo"},
+        data="zoo/ppo/weights/ppo",
+        data_files=("ppo.zip",),
+        packages=("stable-baselines3", "torch"),
+    ),
+    "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",
@@ -138,6 +179,14 @@ SCHEMES: dict[str, AgentEntry] = {
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="driveinsight:FOLDER: a policy that `driveinsight train` wrote",
         version=2,
+        argument="weights",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
+    "zoo": AgentEntry(
+        entry_point="agents.zoo.loading:FolderDriver",
+        summary="zoo:FOLDER[?rules=off]: a system of the zoo that `driveinsight train` wrote",
+        version=1,
         argument="weights",
         data_files=POLICY_FILES,
         packages=("torch",),
@@ -170,15 +219,17 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
 
     Args:
         spec: A name of `AGENTS`, or `module:Class`, or `path/to/file.py:Class`, or
-            `scheme:file?option=value&option=value` with a scheme of `SCHEMES`.
+            `scheme:file` with a scheme of `SCHEMES`; a name and a file may be followed by
+            `?option=value&option=value`.
         options: Keyword arguments of the agent's class; they override the table's.
 
     Raises:
         AgentSpecError: If the name, module, file or class is unknown, or the class is no agent.
     """
-    entry = AGENTS.get(spec)
-    if entry is not None:
-        return _make(spec, entry.entry_point, {**entry.options, **options})
+    name, said = named(spec)
+    if name in AGENTS:
+        entry = AGENTS[name]
+        return _make(spec, entry.entry_point, {**entry.options, **said, **options})
     scheme, _, place = spec.partition(":")
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
@@ -186,8 +237,17 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
         given = {entry.argument: path, **said, **options}
         return _make(spec, entry.entry_point, {**entry.options, **given})
     if ":" not in spec:
-        raise AgentSpecError(_unknown_name(spec))
+        raise AgentSpecError(_unknown_name(name))
     return _make(spec, spec, options)
+
+
+def named(spec: str) -> tuple[str, dict[str, str]]:
+    """A name of the table, and what is said of it: `interfuser?rules=off`, as of files.
+
+    Raises:
+        AgentSpecError: If what is said is not option=value.
+    """
+    return (spec, {}) if ":" in spec else place_and_options(spec, spec)
 
 
 def place_and_options(spec: str, place: str) -> tuple[str, dict[str, str]]:

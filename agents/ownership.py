@@ -11,15 +11,15 @@ from pathlib import Path
 
 from agents import AGENTS, SCHEMES
 
-# Of the schemes, the one whose files are numbers and text: a policy of ours
-_DATA_ONLY = "driveinsight"
+# The schemes whose files are numbers and text: policies of ours, systems of the zoo
+_DATA_ONLY = ("driveinsight", "zoo")
 _OURS = {*AGENTS, *(entry.entry_point for entry in AGENTS.values())}
 
 
 def code_of_others(spec: str) -> str:
     """What code that is not ours an agent's specification runs, in a few words; empty if none."""
     scheme, _, place = spec.partition(":")
-    if spec in _OURS or not place or scheme == _DATA_ONLY:
+    if spec in _OURS or not place or scheme in _DATA_ONLY:
         return ""
     if scheme == "sb3":
         return f"the pickles in {_file_of(place)}"

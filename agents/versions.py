@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-from agents import AGENTS, SCHEMES, AgentEntry, place_and_options
+from agents import AGENTS, SCHEMES, AgentEntry, named, place_and_options
 
 
 def agent_version(spec: str) -> str:
@@ -25,10 +25,11 @@ def agent_version(spec: str) -> str:
     Args:
         spec: See `agents.load_agent`, which must be able to load it.
     """
-    if spec in AGENTS:
-        entry = AGENTS[spec]
+    name, _ = named(spec)
+    if name in AGENTS:
+        entry = AGENTS[name]
         own = Path(__file__).parent / entry.data
-        return _declared(spec, entry, [own] if entry.data else [])
+        return _declared(name, entry, [own] if entry.data else [])
     scheme, _, place = spec.partition(":")
     if scheme in SCHEMES:
         path, options = place_and_options(spec, place)
@@ -38,7 +39,7 @@ def agent_version(spec: str) -> str:
 
 def agent_packages(spec: str) -> tuple[str, ...]:
     """Packages whose version can change a bit of what the agent does, beside the world's own."""
-    entry = AGENTS.get(spec) or SCHEMES.get(spec.partition(":")[0])
+    entry = AGENTS.get(named(spec)[0]) or SCHEMES.get(spec.partition(":")[0])
     return entry.packages if entry is not None else OF_OTHERS
 
 

@@ -31,7 +31,7 @@ FLOORS = {
         {"", "navigation"},
         {"expert", "carla", "sb3", "explain", "networks"},
         {"driveinsight"},
-        {"training"},
+        {"training", "zoo"},
     ),
     "wrappers": ({"interventions"}, {""}),
     "leaderboard": (

@@ -73,10 +73,10 @@ class ResNet(nn.Module):
         channels: Of the feature maps that `forward` returns.
     """
 
-    def __init__(self, block: str, depths: Sequence[int], width: int) -> None:
+    def __init__(self, block: str, depths: Sequence[int], width: int, *, inputs: int = 3) -> None:
         super().__init__()
         kind = BLOCKS[block]
-        self.conv1 = nn.Conv2d(3, width, 7, 2, 3, bias=False)
+        self.conv1 = nn.Conv2d(inputs, width, 7, 2, 3, bias=False)
         self.bn1 = nn.BatchNorm2d(width)
         inputs, self.channels = width, [width * 2**n * kind.expansion for n in range(len(depths))]
         for n, depth in enumerate(depths):
@@ -89,9 +89,17 @@ class ResNet(nn.Module):
 
     def forward(self, images: Tensor) -> list[Tensor]:
         """(B, 3, H, W) to feature maps at strides 4, 8, 16 …, one for each layer."""
-        x = F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
-        maps = []
-        for n in range(1, len(self.channels) + 1):
-            x = self.get_submodule(f"layer{n}")(x)
+        x, maps = self.stem(images), []
+        for n in range(len(self.channels)):
+            x = self.layer(n, x)
             maps.append(x)
         return maps
+
+    def stem(self, images: Tensor) -> Tensor:
+        """(B, 3, H, W) to (B, width, H/4, W/4)."""
+        return F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
+
+    def layer(self, number: int, x: Tensor) -> Tensor:
+        """One of its layers, 0 the first: for who puts something between them."""
+        out: Tensor = self.get_submodule(f"layer{number + 1}")(x)
+        return out

@@ -13,26 +13,22 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import nn
 
-from agents.driveinsight.config import TOKENS, PolicyConfig
-from agents.driveinsight.losses import counts, losses
-from agents.driveinsight.model import Policy
 from agents.training.checkpoints import load_checkpoint, rate_at, save_checkpoint
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
-from agents.training.predictions import look
-from agents.training.samples import Batch, hidden_components, without
+from agents.training.samples import Batch
+from agents.training.trainees import Config, Trainee, trainee_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash
-
-_PLANNING = ("prompt.", "planner.")  # what a policy that sees nothing has too
 
 
 @dataclass(kw_only=True)
 class Training:
     """A policy being trained: all that a checkpoint holds, and who trains it."""
 
-    policy: Policy
+    trainee: Trainee
+    policy: nn.Module
     optimiser: torch.optim.Optimizer
     config: TrainConfig
     step: int = 0
@@ -40,19 +36,20 @@ class Training:
 
     @classmethod
     def begin(
-        cls, policy_config: PolicyConfig, config: TrainConfig, device: str, team: Team = ALONE
+        cls, policy_config: Config, config: TrainConfig, device: str, team: Team = ALONE
     ) -> Training:
         """Fresh weights, drawn from the seed."""
         torch.manual_seed(config.seed)
-        policy = Policy(policy_config).to(device)
+        trainee = trainee_of(policy_config)
+        policy = trainee.network().to(device)
         team.begin(policy)
         optimiser = torch.optim.AdamW(
-            _groups(policy, config),
+            trainee.groups(policy, config),
             lr=config.learning_rate,
             weight_decay=config.weight_decay,
             fused=True,  # a planner's step takes a tenth less time
         )
-        return cls(policy=policy, optimiser=optimiser, config=config, team=team)
+        return cls(trainee=trainee, policy=policy, optimiser=optimiser, config=config, team=team)
 
     def save(self, path: Path) -> None:
         """Writes a checkpoint; the old one stays until the new one is whole.
@@ -95,8 +92,11 @@ class Training:
             group["lr"] = rate * group["rate"]
         self.policy.train()
         self.optimiser.zero_grad()
-        hidden = self._hidden(config.batch)[self.team.share(config.batch)]
-        terms = self._terms(batch, hidden)
+        key = int(keyed_hash(config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
+        share = self.team.share(config.batch)
+        found = self.trainee.learnt(self.policy, batch, config, key, share)
+        # of a share, such that they sum up to the whole batch's
+        terms = self.team.weighted(*found)
         values = self.team.summed(terms)
         if not math.isfinite(values["total"]):
             raise self._diverged(f"loss is {values['total']}")
@@ -120,23 +120,15 @@ class Training:
         """
         self.team.share_buffers(self.policy)
         self.policy.eval()
-        share = self.team.share(self.config.batch)
         looks = self.config.measured // self.config.batch
         sums = dict.fromkeys(self.config.measures, 0.0)
         with torch.no_grad():
             for _ in range(looks):
                 batch = next(data)
                 for column, names in self.config.measures.items():
-                    given = without(names, share.stop - share.start)
-                    sums[column] += self.team.summed(self._terms(batch, given))["waypoints"]
+                    found = self.trainee.measured(self.policy, batch, self.config, names)
+                    sums[column] += self.team.summed(self.team.weighted(*found))["waypoints"]
         return {column: total / looks for column, total in sums.items()}
-
-    def _terms(self, batch: Batch, hidden: Tensor) -> dict[str, Tensor]:
-        """The terms of the loss; of a share, such that they sum up to the whole batch's."""
-        mixed = self.config.precision == "bfloat16"
-        output, targets = look(self.policy, batch, hidden, mixed=mixed)
-        terms = losses(output, targets, self.config.loss)
-        return self.team.weighted(terms, counts(targets, self.config.loss))
 
     def _diverged(self, what: str) -> TrainingError:
         return TrainingError(
@@ -146,23 +138,4 @@ class Training:
 
     def _asked(self) -> dict[str, Any]:
         """What decides what comes out."""
-        return {**self.config.to_mapping(), "policy": self.policy.config.to_mapping()}
-
-    def _hidden(self, size: int) -> Tensor:
-        """(B, 10) which components are hidden (0) in this step."""
-        if self.config.overfit:
-            return torch.ones(size, len(TOKENS))
-        key = int(keyed_hash(self.config.seed, int(Stream.AGENT), self.step, 3)) % 2**62
-        return hidden_components(self.policy.config, size, key)
-
-
-def _groups(policy: Policy, config: TrainConfig) -> list[dict[str, Any]]:
-    """Parameters by how fast they learn: those that see, and those that plan.
-
-    Where nothing is rendered those that see stay as they are.
-    """
-    seeing, planning = list[nn.Parameter](), list[nn.Parameter]()
-    for name, parameter in policy.named_parameters():
-        (planning if name.startswith(_PLANNING) else seeing).append(parameter)
-    groups = ((seeing if config.rendered else [], 1.0), (planning, config.planner_rate))
-    return [{"params": params, "rate": rate} for params, rate in groups if params]
+        return {**self.config.to_mapping(), "policy": self.trainee.config.to_mapping()}

@@ -21,7 +21,6 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
-from agents.driveinsight.config import PolicyConfig
 from agents.processes import live_for_parent
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig, TrainingError
@@ -29,6 +28,7 @@ from agents.training.distributed import ALONE, Team
 from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import training_plan, training_town
+from agents.training.trainees import Config, trainee_from, trainee_of
 from agents.training.variation import Variation
 from di_envs.numerics.keyed_arrays import keyed_uniforms
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
@@ -188,8 +188,8 @@ class Samples(Dataset[Sample]):
     Drives and towns are read when they are first wanted, and kept: a few kB a moment.
     """
 
-    def __init__(self, config: PolicyConfig, training: TrainConfig, moments: Moments) -> None:
-        self._config, self._moments = config, moments
+    def __init__(self, config: Config, training: TrainConfig, moments: Moments) -> None:
+        self._trainee, self._moments = trainee_of(config), moments
         self.training = training
         taught, kept_out = moments.held_out(training.held_out)
         self._chosen = taught.some(training.overfit) if training.overfit else taught
@@ -199,7 +199,8 @@ class Samples(Dataset[Sample]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what it is made from, without what it has read."""
-        return _samples, (self._config.to_mapping(), self.training, self._moments)
+        config = self._trainee.config.to_mapping()
+        return _samples, (config, self.training, self._moments)
 
     def __len__(self) -> int:
         return self.training.steps * self.training.batch
@@ -222,7 +223,7 @@ class Samples(Dataset[Sample]):
 
     def _past(self, number: int) -> int:
         """Moments that are remembered: each number as often, and the same for a whole batch."""
-        frames, training = self._config.memory_frames, self.training
+        frames, training = self._trainee.past, self.training
         if training.overfit or number >= len(self):
             return frames
         step = number // training.batch
@@ -236,12 +237,12 @@ class Samples(Dataset[Sample]):
     def _renderer(self, drive: RecordedDrive) -> Renderer:
         town = str(drive.facts["town"])
         if town not in self._renderers:
-            self._renderers[town] = Renderer(self._config, *town_of(drive))
+            self._renderers[town] = self._trainee.renderer(*town_of(drive))
         return self._renderers[town]
 
 
 def _samples(config: Mapping[str, Any], training: TrainConfig, moments: Moments) -> Samples:
-    return Samples(PolicyConfig.from_mapping(config), training, moments)
+    return Samples(trainee_from(config).config, training, moments)
 
 
 def order(training: TrainConfig, first_step: int, share: slice) -> Iterator[int]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
+from torch import nn
+
 from agents.training.learning import Training
 from agents.training.log import append_row, forget_rows_after, read_rows
 from agents.training.model_card import model_card
@@ -34,7 +34,7 @@ class Checks:
     """
 
     every: int
-    score: Callable[[Policy], Mapping[str, float] | None]
+    score: Callable[[nn.Module], Mapping[str, float] | None]
 
 
 def train(
@@ -182,12 +182,13 @@ class _Loop:
 
     def _keep(self) -> None:
         """Writes the present policy with its card."""
+        training = self.training
         card = model_card(
-            self.training.policy,
-            self.training.config,
-            step=self.training.step,
+            training.trainee.about(training.policy),
+            training.config,
+            step=training.step,
             log=read_rows(self.folder / LOG_FILE),
             checks=read_rows(self.folder / CHECKS_FILE),
             about_data=self.about_data,
         )
-        save_pretrained(self.training.policy, self.folder / POLICY_FOLDER, card)
+        training.trainee.save(training.policy, self.folder / POLICY_FOLDER, card)

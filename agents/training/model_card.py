@@ -10,6 +10,7 @@ from torch import nn
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.config import TrainConfig
+from agents.zoo.system import MOMENT_DT_S, SystemConfig
 
 _LIMITS = """\
 It has seen made-up towns of this simulator only, with its own pictures of them, driven by the
@@ -18,8 +19,34 @@ are the simulator's truth, which no real car has. It is made for research on why
 as they do, not for driving."""
 
 
+def about_policy(network: nn.Module, config: PolicyConfig) -> tuple[str, ...]:
+    """What a policy of the paper's kind is: the title, and a paragraph each."""
+    return (
+        f"# DriveInsight policy `{config.name}`",
+        f"{_size(network):,} parameters; reads {', '.join(config.observations)}; prompt components "
+        f"{', '.join(config.prompt) or 'none'}; {config.planner.waypoints} waypoints "
+        f"{config.planner.waypoint_dt_s} s apart.",
+        "Hidden in training, at these rates, fixed beforehand:",
+        _json(dict(config.planner.dropout)),
+    )
+
+
+def about_system(network: nn.Module, config: SystemConfig) -> tuple[str, ...]:
+    """What a system of the zoo is: the title, and a paragraph each."""
+    return (
+        f"# System `{config.name}`",
+        f"{_size(network):,} parameters; sees {config.inputs}; {config.waypoints} waypoints "
+        f"{MOMENT_DT_S} s apart.",
+        _json(config.to_mapping()),
+    )
+
+
+def _size(network: nn.Module) -> int:
+    return sum(parameter.numel() for parameter in network.parameters())
+
+
 def model_card(
-    policy: nn.Module,
+    about: Sequence[str],
     config: TrainConfig,
     *,
     step: int,
@@ -30,25 +57,18 @@ def model_card(
     """The card as Markdown.
 
     Args:
-        policy: With its `config`.
+        about: What it is: the title, and a paragraph each.
         config: How it was trained.
         step: Steps done.
         log: Rows of the training's log.
         checks: Rows of its closed-loop checks.
         about_data: The data card; see `collect.data_card`.
     """
-    shape: PolicyConfig = policy.config  # type: ignore[assignment]
-    size = sum(parameter.numel() for parameter in policy.parameters())
     parts = [
-        f"# DriveInsight policy `{shape.name}`",
-        f"{size:,} parameters; reads {', '.join(shape.observations)}; prompt components "
-        f"{', '.join(shape.prompt) or 'none'}; {shape.planner.waypoints} waypoints "
-        f"{shape.planner.waypoint_dt_s} s apart.",
+        *about,
         "## Training",
         f"Step {step} of {config.steps}; batches of {config.batch}.",
         _json(config.to_mapping()),
-        "Hidden in training, at these rates, fixed beforehand:",
-        _json(dict(shape.planner.dropout)),
     ]
     if log:
         terms = ", ".join(f"{name} {value:.3f}" for name, value in log[-1].items())

@@ -7,8 +7,10 @@ expert's true path as the way back.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +18,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from agents.base import Requirements
+from agents.driveinsight.agent import requirements_of
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.losses import Targets
@@ -27,28 +31,44 @@ from agents.training.waypoints import expert_waypoints
 from di_envs.numerics.keyed_arrays import keyed_uniforms
 from di_envs.numerics.keyed_random import Stream
 from di_envs.observer import Observer
-from di_envs.sensors.camera.config import rig_of
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """What was seen at T moments, oldest first, and the targets of the newest; batches of one."""
+    """What was seen at T moments, oldest first, and the targets of the newest; batches of one.
 
-    inputs: tuple[Inputs, ...]
-    targets: Targets
+    Both are bundles of tensors: `Inputs` and `Targets` of the paper's policy, mappings of a system
+    of the zoo.
+    """
+
+    inputs: tuple[Any, ...]
+    targets: Any
 
 
-class Renderer:
+class Renderer(ABC):
     """Renders samples of one town with one policy's sensors. Towns are loaded once a process."""
 
     def __init__(
-        self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan]
+        self, needs: Requirements, town: Town, plan_of: Callable[[str], RoutePlan]
     ) -> None:
-        self.config, self._town, self._plan_of = config, town, plan_of
-        self._rig = None if config.camera is None else rig_of(config.camera.rig)
+        self._needs, self._town, self._plan_of = needs, town, plan_of
         self._stages = functools.lru_cache(64)(self._stage)
+
+    @abstractmethod
+    def inputs(self, observation: Mapping[str, Any], stage: DriveStage) -> Any:
+        """What the policy sees at the moment that a stage shows."""
+
+    @abstractmethod
+    def targets(
+        self,
+        drive: RecordedDrive,
+        moment: int,
+        stage: DriveStage,
+        observation: Mapping[str, Any],
+    ) -> Any:
+        """What it is to say there."""
 
     def sample(
         self, drive: RecordedDrive, last: int, variation: Variation, key: int, *, past: int
@@ -65,27 +85,42 @@ class Renderer:
         right_m, turn_rad, weather = drawn(variation, key)
         stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
         observer.change_weather(weather)
-        inputs = []
+        inputs, observation = list[Any](), dict[str, Any]()
         for moment in range(max(last - past, 0), last + 1):
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
             observation = observer.observe()
-            inputs.append(inputs_of(self.config, observation))
-        return Sample(inputs=tuple(inputs), targets=self._targets(drive, last, stage))
+            inputs.append(self.inputs(observation, stage))
+        targets = self.targets(drive, last, stage, observation)
+        return Sample(inputs=tuple(inputs), targets=targets)
 
     def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
         plan = self._plan_of(route_id)
-        lidar = self.config.lidar.lidar if self.config.lidar else "paper"
-        observer = Observer(
-            self._town,
-            self.config.observations,
-            cameras=self._rig or "small",
-            lidar=lidar,
-        )
+        sensors = {"cameras": "small", "lidar": "paper", **self._needs.options}
+        observer = Observer(self._town, self._needs.observations, **sensors)
         stage = DriveStage(self._town, plan, capacity)
         observer.start(stage.view)  # once: its kernels are looked up in it, which takes a while
         return stage, observer
 
-    def _targets(self, drive: RecordedDrive, moment: int, stage: DriveStage) -> Targets:
+
+class PolicyRenderer(Renderer):
+    """Renders samples of the paper's policy."""
+
+    def __init__(
+        self, config: PolicyConfig, town: Town, plan_of: Callable[[str], RoutePlan]
+    ) -> None:
+        super().__init__(requirements_of(config), town, plan_of)
+        self.config = config
+
+    def inputs(self, observation: Mapping[str, Any], stage: DriveStage) -> Inputs:
+        return inputs_of(self.config, observation)
+
+    def targets(
+        self,
+        drive: RecordedDrive,
+        moment: int,
+        stage: DriveStage,
+        observation: Mapping[str, Any],
+    ) -> Targets:
         state = stage.view.state
         pose = np.array([state.x[0], state.y[0], state.yaw[0]])
         waypoints, valid = expert_waypoints(drive, moment, self.config.planner.waypoints, pose)
@@ -110,45 +145,37 @@ class Batch:
         begun: (T, B) 0 where the sample has no such moment: it repeats its first.
     """
 
-    inputs: tuple[Inputs, ...]
-    targets: Targets
+    inputs: tuple[Any, ...]
+    targets: Any
     begun: Tensor
 
 
 def batch_of(samples: Sequence[Sample]) -> Batch:
     """Puts samples side by side; shorter ones repeat their first moment, which does not count."""
     length = max(len(sample.inputs) for sample in samples)
-    inputs, begun = [], torch.ones(length, len(samples))
+    inputs, begun = list[Any](), torch.ones(length, len(samples))
     for t in range(length):
         places = [t - (length - len(sample.inputs)) for sample in samples]
         begun[t] = torch.tensor([float(place >= 0) for place in places])
         pairs = zip(samples, places, strict=True)
-        inputs.append(_joined_inputs([sample.inputs[max(place, 0)] for sample, place in pairs]))
-    targets = _joined_targets([sample.targets for sample in samples])
+        inputs.append(joined([sample.inputs[max(place, 0)] for sample, place in pairs]))
+    targets = joined([sample.targets for sample in samples])
     return Batch(inputs=tuple(inputs), targets=targets, begun=begun)
 
 
-def _joined(parts: Sequence[Tensor | None]) -> Tensor | None:
-    kept = [part for part in parts if part is not None]
-    return torch.cat(kept) if kept else None
-
-
-def _joined_inputs(parts: Sequence[Inputs]) -> Inputs:
-    return Inputs(
-        prompt={name: torch.cat([part.prompt[name] for part in parts]) for name in parts[0].prompt},
-        present=torch.cat([part.present for part in parts]),
-        images=tuple(torch.cat(group) for group in zip(*(p.images for p in parts), strict=True)),
-        points=_joined([part.points for part in parts]),
-        pose=_joined([part.pose for part in parts]),
-    )
-
-
-def _joined_targets(parts: Sequence[Targets]) -> Targets:
-    return Targets(
-        waypoints=torch.cat([part.waypoints for part in parts]),
-        valid=torch.cat([part.valid for part in parts]),
-        semantics=_joined([part.semantics for part in parts]),
-    )
+def joined(parts: Sequence[Any]) -> Any:
+    """Bundles side by side: tensors, mappings or tuples of them, dataclasses of these."""
+    first = parts[0]
+    if first is None:
+        return None
+    if isinstance(first, Tensor):
+        return torch.cat(list(parts))
+    if isinstance(first, Mapping):
+        return {name: joined([part[name] for part in parts]) for name in first}
+    if isinstance(first, tuple):
+        return tuple(joined(group) for group in zip(*parts, strict=True))
+    names = [field.name for field in dataclasses.fields(first)]
+    return type(first)(**{name: joined([getattr(part, name) for part in parts]) for name in names})
 
 
 def hidden_components(config: PolicyConfig, batch: int, key: int) -> Tensor:

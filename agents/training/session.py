@@ -16,7 +16,7 @@ from typing import Any
 import torch
 
 from agents.driveinsight.config import PolicyConfig
-from agents.driveinsight.weights import take_weights, weights_digest
+from agents.networks.weights import weights_digest
 from agents.training.caching import cached
 from agents.training.collect import data_card
 from agents.training.config import TrainConfig, TrainingError
@@ -27,6 +27,7 @@ from agents.training.loop import CHECKPOINT_FILE
 from agents.training.own_eyes import digest_of_rows, own_eyes
 from agents.training.planning import PlanningSamples
 from agents.training.samples import Batch
+from agents.training.trainees import Config
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +48,7 @@ class TrainingPlan:
         seen: Folders of what the policy's own eyes have seen of drives; see `own_eyes`.
     """
 
-    policy: PolicyConfig
+    policy: Config
     training: TrainConfig
     data: tuple[Path, ...]
     folder: Path
@@ -130,9 +131,9 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
     taken: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
     if plan.init_from is not None:
-        taken, left = map(tuple, take_weights(training.policy, plan.init_from))
+        taken, left = map(tuple, training.trainee.take(training.policy, plan.init_from))
     if plan.eyes is not None:
-        take_weights(training.policy, plan.eyes, only="perception.")
+        training.trainee.take(training.policy, plan.eyes, only="perception.")
     return Session(
         plan=plan, training=training, samples=samples, resumed=False, taken=taken, left=left
     )
@@ -144,6 +145,11 @@ def _samples(
     """What renders moments, or what has them encoded: the first of a team encodes them."""
     if config.rendered:
         return Samples(plan.policy, config, moments)
+    if not isinstance(plan.policy, PolicyConfig):
+        raise TrainingError(
+            f"'{plan.policy.name}' is a system of the zoo, which learns as a whole from what it is "
+            f"shown: leave --plan-only out"
+        )
     if team.first:
         cached(moments, plan.policy.grid, plan.cache)
     team.any(False)  # the others wait until it is there

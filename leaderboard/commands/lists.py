@@ -13,10 +13,11 @@ class Agents:
 
     def run(self) -> int:
         """Prints the list; returns the exit code."""
-        from leaderboard.tables.lists import agent_table, scheme_table
+        from leaderboard.tables.lists import agent_table, scheme_table, zoo_table
 
         Terminal().print(
             agent_table(),
+            zoo_table(),
             scheme_table(),
             "Your own: --agent module:Class or --agent path/to/file.py:Class (see agents/base.py).",
             "Next: driveinsight evaluate --agent expert --suite town05_tiny",

@@ -66,7 +66,8 @@ class Train:
     """With --recipe: do nothing, show its stages, which are done, what they took."""
 
     config: Annotated[str, says("NAME", "driveinsight")] = "driveinsight"
-    """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …"""
+    """Configuration of the policy: driveinsight, driveinsight-told, tiny, paper, …; or a system of
+    the zoo, such as ego-only."""
 
     plan_only: bool = False
     """Train the planner alone, by what truly is in sight instead of pictures: hundreds of samples a
@@ -191,9 +192,9 @@ class Train:
 
     def _plan(self) -> TrainingPlan:
         """What the arguments ask for."""
-        from agents.driveinsight.config import config_named
         from agents.training.config import PLANNING, TrainConfig
         from agents.training.session import TrainingPlan
+        from agents.training.trainees import config_named
 
         try:
             policy = config_named(self.config)
@@ -266,8 +267,8 @@ def _tell_trained(session: Session) -> None:
         say(f"Drove best at step {best['step']:.0f}: driving score {best['driving_score']:.1f}.")
     policy = folder / POLICY_FOLDER
     training = session.training
-    blind = training.policy.config.sensors and not training.config.rendered
-    agent = typed(f"{'true-sight' if blind else 'driveinsight'}:{policy}")
+    blind = training.trainee.config.sensors and not training.config.rendered
+    agent = typed(f"{'true-sight' if blind else training.trainee.scheme}:{policy}")
     say(
         f"Written: {policy}, {folder / LOG_FILE}" + (f", {curve}" if drawn else ""),
         f"Next: driveinsight evaluate --agent {agent} --suite town05_tiny",

@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rich.console import Console
+from torch import nn
 
-from agents.driveinsight.model import Policy
 from agents.training.learning import Training
 from agents.training.loop import Checks, train
 from agents.training.session import Session, TrainingPlan, begin, joined
@@ -99,16 +99,16 @@ def _checks(
     with (
         TemporaryDirectory(prefix="driveinsight-") as folder,
         ClosedLoopCheck(
-            training.policy.config,
+            training.trainee,
             Path(folder),
             plan.routes,
-            lent_eyes=training.policy.config.sensors and not training.config.rendered,
+            lent_eyes=training.trainee.config.sensors and not training.config.rendered,
             stop=stop,
             on_route=show.route,
         ) as drives,
     ):
 
-        def score(policy: Policy) -> Mapping[str, float] | None:
+        def score(policy: nn.Module) -> Mapping[str, float] | None:
             found = drives(policy)
             if found is not None:
                 show.checked(found["driving_score"])

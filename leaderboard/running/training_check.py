@@ -7,10 +7,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from agents.driveinsight.agent import requirements_of
+from torch import nn
+
 from agents.driveinsight.config import PolicyConfig
-from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
+from agents.training.trainees import Trainee
 from agents.training.true_sight import requirements_with_lent_eyes
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import Job, RunSpec
@@ -28,7 +28,7 @@ class ClosedLoopCheck:
 
     def __init__(
         self,
-        config: PolicyConfig,
+        trainee: Trainee,
         folder: Path,
         routes: int,
         *,
@@ -39,28 +39,28 @@ class ClosedLoopCheck:
         """Loads the town.
 
         Args:
-            config: Of the policy.
+            trainee: What is trained.
             folder: Where the policy is put for its agent to load.
             routes: How many to drive.
             lent_eyes: What truly is in sight stands in for what its sensors would see.
             stop: Asked before each route whether to leave it.
             on_route: Told the number of each route that begins.
         """
-        self._folder, self._stop, self._on_route = folder, stop, on_route
-        scheme, needs = "driveinsight", requirements_of(config)
-        if lent_eyes:
+        self._trainee, self._folder, self._stop, self._on_route = trainee, folder, stop, on_route
+        scheme, needs, config = trainee.scheme, trainee.requires, trainee.config
+        if lent_eyes and isinstance(config, PolicyConfig):
             scheme, needs = "true-sight", requirements_with_lent_eyes(config)
         self._driver = Driver(RunSpec(agent=f"{scheme}:{folder}", options={"suite": SUITE}), needs)
         ids = self._driver.env.route_ids[:routes]
         self._jobs = [Job(index=n, route_id=route_id, seed=0) for n, route_id in enumerate(ids)]
 
-    def __call__(self, policy: Policy) -> Mapping[str, float] | None:
+    def __call__(self, policy: nn.Module) -> Mapping[str, float] | None:
         """The mean scores; None if asked to stop.
 
         Raises:
             CheckError: If a route could not be driven.
         """
-        save_pretrained(policy, self._folder, "A policy that is being checked.\n")
+        self._trainee.save(policy, self._folder, "A policy that is being checked.\n")
         scores = []
         for job in self._jobs:
             if self._stop():

@@ -19,8 +19,38 @@ def agent_table() -> Table:
     for column in ("name", "track", "what it does"):
         table.add_column(column)
     for name, entry in AGENTS.items():
-        table.add_row(name, _track(name), escape(entry.summary))
+        if not entry.data.startswith(_ZOO):
+            table.add_row(name, _track(name), escape(entry.summary))
     return table
+
+
+def zoo_table() -> Table:
+    """The systems of the zoo: what each sees, how large it is and how well it drives."""
+    table = Table(title="the zoo", title_justify="left", title_style="bold")
+    table.add_column("name")
+    table.add_column("track")
+    table.add_column("inputs")
+    table.add_column("parameters", justify="right")
+    table.add_column("town05_short", justify="right")
+    table.add_column("what it is")
+    for name, entry in AGENTS.items():
+        if entry.data.startswith(_ZOO):
+            score = entry.score or "not trained"
+            table.add_row(name, *_facts_of(name), score, escape(entry.summary))
+    return table
+
+
+def _facts_of(name: str) -> tuple[str, str, str]:
+    """Track, inputs and parameters of a system, trained or not."""
+    try:
+        from agents.zoo.registry import config_of, network_of, system_names
+    except ImportError as error:
+        return f"needs {error.name}", "", ""
+    if name not in system_names():
+        return _track(name), "", ""
+    config = config_of(name)
+    size = sum(parameter.numel() for parameter in network_of(config).parameters())
+    return str(config.requires.track), config.inputs, f"{size:,}"
 
 
 def scheme_table() -> Table:
@@ -71,6 +101,7 @@ def _traffic_cells(suite: Suite) -> tuple[str, str]:
     return str(suite.traffic.vehicles), str(suite.traffic.walkers)
 
 
+_ZOO = "zoo/"  # where the weights of its systems are
 _NUMBERS = ("version", "routes", "vehicles", "walkers")
 
 

@@ -19,6 +19,7 @@ from agents.training.collect import (
 from agents.training.hiding import EVERYTHING, Hiding
 from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
 from agents.training.towns import KNOWN_TOWNS, TRAINING_TOWNS
+from agents.training.trainees import driver_of
 from di_envs.files.json_values import indented
 from di_envs.files.names import check_name
 from di_envs.files.whole import write_whole
@@ -85,7 +86,7 @@ def run_correct(run: StageRun) -> Made | None:
     settings: CorrectStage = run.settings
     policy = run.takes["learner"][0] / POLICY_FOLDER
     own = settings.eyes == "own"
-    driver = f"driveinsight:{policy}" if own else f"true-sight:{policy}?eyes={settings.eyes}"
+    driver = driver_of(policy) if own else f"true-sight:{policy}?eyes={settings.eyes}"
     return _drive(run, settings.towns, settings.frames, driver, Hiding.of(settings.hidden))
 
 

@@ -6,12 +6,13 @@ import time
 from contextlib import closing
 from dataclasses import dataclass
 
-from agents.driveinsight.config import config_named
+from agents.driveinsight.config import config_named as paper_config_named
 from agents.training.config import HELD_OUT, PLANNING, TrainConfig
 from agents.training.log import read_rows, write_curve
 from agents.training.loop import LOG_FILE, train
 from agents.training.recipes.kinds import POLICY_FOLDER, SEEN_FOLDER, Made, Progress, StageRun
 from agents.training.session import TrainingPlan, begin, joined
+from agents.training.trainees import config_named
 
 _CACHE_FOLDER = "encoded-moments"  # beside the stages: what one has encoded, others find
 _MEMORY = 0.98  # of the running mean of the waypoint loss
@@ -45,7 +46,7 @@ class PlanStage:
     held_out: float = 0.05
 
     def __post_init__(self) -> None:
-        config_named(self.config)
+        paper_config_named(self.config)
         self.training(seed=0)
 
     @property

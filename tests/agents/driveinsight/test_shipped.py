@@ -7,7 +7,8 @@ import pytest
 from agents import AGENTS, AgentSpecError, load_agent
 from agents.driveinsight.agent import SHIPPED, requirements_of
 from agents.driveinsight.config import config_named
-from agents.driveinsight.weights import CARD_FILE, WEIGHTS_FILE, from_pretrained
+from agents.driveinsight.weights import from_pretrained
+from agents.networks.weights import CARD_FILE, WEIGHTS_FILE
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import Job, RunSpec
 

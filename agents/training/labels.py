@@ -1,0 +1,132 @@
+"""What a system of the zoo is to say, at a moment of a drive: a table of labels, by name.
+
+A system names the labels that it learns from (`SystemConfig.labels`); waypoints every one has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
+from agents.training.bev_teacher import bev_semantics
+from agents.training.frames import DriveStage, RecordedDrive
+from agents.training.truth import seen_truth
+from agents.training.waypoints import expert_waypoints
+from agents.zoo.raster import GRID, true_raster
+from agents.zoo.system import SystemConfig
+from di_envs.actions.controllers import (
+    ControllerMemory,
+    WaypointControllerConfig,
+    waypoints_to_control,
+)
+
+OBJECTS = 48  # that are told, the nearest first
+_FOLLOWING = WaypointControllerConfig()
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabelledMoment:
+    """What labels are made from.
+
+    Attributes:
+        drive: Of which it is a moment.
+        moment: Which.
+        stage: That shows it, with the ego set aside.
+        observation: Of that ego.
+        waypoints: (T, 2) where the expert went, as that ego sees it [m].
+        valid: (T,) 0 or 1: where that is known.
+    """
+
+    drive: RecordedDrive
+    moment: int
+    stage: DriveStage
+    observation: Mapping[str, Any]
+    waypoints: NDArray[np.float32]
+    valid: NDArray[np.float32]
+
+
+def labels_of(
+    config: SystemConfig,
+    drive: RecordedDrive,
+    moment: int,
+    stage: DriveStage,
+    observation: Mapping[str, Any],
+) -> dict[str, Tensor]:
+    """The labels of a moment, as a batch of one: `waypoints`, `valid`, and those that are named."""
+    state = stage.view.state
+    pose = np.array([state.x[0], state.y[0], state.yaw[0]])
+    waypoints, valid = expert_waypoints(drive, moment, config.waypoints, pose)
+    labelled = LabelledMoment(
+        drive=drive,
+        moment=moment,
+        stage=stage,
+        observation=observation,
+        waypoints=waypoints,
+        valid=valid,
+    )
+    found = {"waypoints": waypoints, "valid": valid}
+    found |= {name: LABELS[name](labelled) for name in config.labels}
+    return {name: torch.from_numpy(value)[None] for name, value in found.items()}
+
+
+def _action(at: LabelledMoment) -> NDArray[np.float32]:
+    """(2,) throttle less brake, and steer, that lead to where the expert went.
+
+    Where the ego is set aside its own control would not lead back; where the drive ends that is all
+    there is.
+    """
+    throttle, steer, brake = at.drive.controls[at.moment].tolist()
+    if at.valid[:2].all():
+        speed_mps = float(at.stage.view.state.speed[0])
+        followed, _ = waypoints_to_control(at.waypoints, speed_mps, ControllerMemory(), _FOLLOWING)
+        throttle, steer, brake = followed.tolist()
+    return np.array([throttle - brake, steer], np.float32)
+
+
+def _raster(at: LabelledMoment) -> NDArray[np.float32]:
+    """(C, X, Y) the true view from above, as teachers see it."""
+    return true_raster(at.stage.view, np.asarray(at.observation["routing"]))
+
+
+def _semantics(at: LabelledMoment) -> NDArray[np.uint8]:
+    """(X, Y) `BevClass` on the zoo's grid."""
+    return bev_semantics(at.stage.view, GRID)
+
+
+def _objects(at: LabelledMoment) -> NDArray[np.float32]:
+    """(OBJECTS, 9) who is on the grid, in sight or not, the nearest first; zeros for none.
+
+    Columns are those of `driveinsight.seen`; the last is 1 for who is in sight, and -1 for who is
+    hidden: nobody can be asked for him.
+    """
+    found, _ = seen_truth(at.stage.view, GRID)
+    found = found[np.argsort(np.hypot(found[:, 0], found[:, 1]), kind="stable")][:OBJECTS]
+    out = np.zeros((OBJECTS, OBJECT_COLUMNS), np.float32)
+    out[: len(found)] = found
+    out[: len(found), -1] = np.where(found[:, -1] > 0.0, 1.0, -1.0)
+    return out
+
+
+def _signal(at: LabelledMoment) -> NDArray[np.float32]:
+    """(8,) the signal that governs the ego's lane, with the columns of `seen`; zeros for none."""
+    _, found = seen_truth(at.stage.view, GRID)
+    return found[0] if len(found) else np.zeros(SIGNAL_COLUMNS, np.float32)
+
+
+LABELS: Mapping[str, Callable[[LabelledMoment], NDArray[Any]]] = MappingProxyType(
+    {
+        "action": _action,
+        "raster": _raster,
+        "semantics": _semantics,
+        "objects": _objects,
+        "signal": _signal,
+    }
+)

@@ -1,0 +1,139 @@
+"""Every system of the zoo learns one batch by heart, is stored, drives and is explained."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+import torch
+
+from agents import AGENTS, AgentSpecError, load_agent
+from agents.explain.look import look_at
+from agents.networks.weights import WeightsError
+from agents.training.collect import drive_paths
+from agents.training.config import TrainConfig
+from agents.training.frames import read_drive
+from agents.training.learning import Training
+from agents.training.loading import Samples, batches, load_moments, town_of
+from agents.training.samples import batch_of
+from agents.training.trainees import config_named, trainee_from, trainee_of
+from agents.training.variation import NO_VARIATION
+from agents.zoo.inputs import inputs_of
+from agents.zoo.registry import network_of, system_names
+from agents.zoo.weights import load_system, save_system
+from tests.agents.training.small_policies import on_disk
+
+NAMES = system_names()
+MOST_PARAMETERS = 1_000_000  # two megabytes in float16
+BY_HEART = TrainConfig(
+    steps=60, batch=2, overfit=2, warm_up=5, learning_rate=3e-3, weight_decay=0.0
+)
+
+
+@pytest.fixture(scope="module")
+def moments(drives):
+    return load_moments([drives], standing_share=0.3)
+
+
+@pytest.fixture(scope="module")
+def observation(drives):
+    """What there is to see of a moment, by every sensor that a system may have."""
+    drive = read_drive(drive_paths(drives)[0])
+    seen = {}
+    for name in NAMES:
+        trainee = trainee_of(config_named(name))
+        renderer = trainee.renderer(*town_of(drive))
+        stage, observer = renderer._stages(str(drive.facts["route_id"]), drive.capacity)
+        stage.set(drive, 8)
+        seen |= observer.observe() | {"world": stage.view}
+    return seen
+
+
+@pytest.fixture
+def untrained(tmp_path, request):
+    """A folder with fresh weights of a system."""
+    torch.manual_seed(0)
+    network = network_of(config_named(request.param))
+    save_system(network, tmp_path / "policy", "a card")
+    return network, tmp_path / "policy"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_batch_is_learnt_by_heart(name, moments):
+    training = Training.begin(config_named(name), BY_HEART, "cpu")
+    batch = next(batches(Samples(config_named(name), BY_HEART, moments)))
+    first = training.update(batch)
+    while training.step < BY_HEART.steps:
+        last = training.update(batch)
+    assert first["waypoints"] > 0.5
+    assert last["waypoints"] < 0.15 * first["waypoints"], (first, last)
+    assert last["total"] < 0.5 * first["total"], (first, last)
+
+
+@pytest.mark.parametrize("untrained", NAMES, indirect=True)
+def test_weights_are_stored_small_and_come_back(untrained):
+    network, folder = untrained
+    assert sum(parameter.numel() for parameter in network.parameters()) <= MOST_PARAMETERS
+    loaded = load_system(folder)
+    assert loaded.config == network.config
+    for name, value in network.state_dict().items():
+        assert torch.equal(loaded.state_dict()[name], on_disk(value)), name
+
+
+@pytest.mark.parametrize("untrained", NAMES, indirect=True)
+def test_it_drives_one_decision_and_says_why(untrained, observation):
+    network, folder = untrained
+    agent = load_agent(f"zoo:{folder}")
+    memory = agent.start(None, seed=0)
+    control, after = agent.act(observation, memory)
+    assert control.shape == (3,)
+    assert after.decision == 1
+    again, _ = agent.act(observation, memory)
+    assert (again == control).all()
+    look = look_at(agent, observation, memory)
+    assert look.response.waypoints.shape == (network.config.waypoints, 2)
+    assert set(look.response.groups) == set(network.anatomy.groups)
+    assert look.response.groups or look.maps
+    assert all((part >= 0.0).all() for part in look.maps.values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_system_without_weights_says_how_to_train_it(name):
+    if AGENTS[name].score:
+        pytest.skip("it is trained")
+    with pytest.raises(AgentSpecError, match="not trained yet: driveinsight train --recipe reci"):
+        load_agent(name)
+
+
+def test_a_configuration_comes_back_from_its_values():
+    for name in NAMES:
+        config = config_named(name)
+        assert trainee_from(config.to_mapping()).config == config
+
+
+def test_a_hidden_component_is_told_as_zeros(observation):
+    config = config_named("ego-only")
+    told = inputs_of(config, observation)
+    assert set(told) == {"target_point", "command", "speed"}
+    assert told["target_point"].abs().sum() > 0.0
+    hidden = {**observation, "prompt_present": 0 * observation["prompt_present"]}
+    assert not any(value.any() for value in inputs_of(config, hidden).values())
+
+
+def test_batches_of_a_system_put_moments_and_labels_side_by_side(drives):
+    drive = read_drive(drive_paths(drives)[0])
+    renderer = trainee_of(config_named("roach-raster")).renderer(*town_of(drive))
+    samples = [renderer.sample(drive, last, NO_VARIATION, 1, past=0) for last in (4, 6)]
+    batch = batch_of(samples)
+    assert batch.inputs[0]["raster"].shape[0] == 2
+    assert batch.targets["waypoints"].shape == (2, 4, 2)
+    assert batch.targets["action"].shape == (2, 2)
+
+
+def test_weights_of_another_size_are_refused(tmp_path):
+    config = config_named("ego-only")
+    save_system(network_of(config), tmp_path, "a card")
+    save_system(network_of(dataclasses.replace(config, width=64)), tmp_path / "other", "a card")
+    (tmp_path / "other" / "config.json").replace(tmp_path / "config.json")
+    with pytest.raises(WeightsError, match="does not fit"):
+        load_system(tmp_path)
