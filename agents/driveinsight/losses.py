@@ -12,9 +12,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.driveinsight.model import Output
-
-# Rare classes weigh more: most cells hold nothing. In the order of `BevClass`.
-_CLASS_WEIGHTS = (0.5, 1.0, 2.0, 4.0, 4.0, 8.0)
+from agents.driveinsight.semantics import CLASS_WEIGHTS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +51,7 @@ def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Te
     weights = _waypoint_weights(targets, config)
     terms = {"waypoints": (error * weights).sum() / weights.sum().clamp(min=1e-3)}
     if output.heads is not None and targets.semantics is not None:
-        classes = torch.tensor(_CLASS_WEIGHTS, device=output.waypoints.device)
+        classes = torch.tensor(CLASS_WEIGHTS, device=output.waypoints.device)
         entropy = F.cross_entropy(output.heads.semantics.float(), targets.semantics.long(), classes)
         terms["semantics"] = config.semantics * entropy
     return {**terms, "total": torch.stack(list(terms.values())).sum()}
@@ -63,7 +61,7 @@ def counts(targets: Targets, config: LossConfig) -> dict[str, Tensor]:
     """By the names of `losses`, what each term is the mean over: parts of a batch weigh by it."""
     found = {"waypoints": _waypoint_weights(targets, config).sum()}
     if targets.semantics is not None:
-        weights = torch.tensor(_CLASS_WEIGHTS, device=targets.semantics.device)
+        weights = torch.tensor(CLASS_WEIGHTS, device=targets.semantics.device)
         found["semantics"] = weights[targets.semantics.long()].sum()
     return found
 

@@ -14,12 +14,12 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.driveinsight.heads import BOX, CLASS_OF_KIND, SPEED_MPS, Heads, ObjectClass
+from agents.driveinsight.semantics import CLASS_WEIGHTS
 from agents.networks.grid import GridConfig
 from di_envs.world.kinds import ActorKind
 
 IGNORED = 255  # class of a cell that nothing is asked of
 OTHERS = 10.0  # added to the state of a lamp that does not govern the ego's lane
-_CLASS_WEIGHTS = (0.5, 0.5, 1.0, 2.0, 1.5, 4.0)  # in the order of `BevClass`: the rare weigh more
 _SPREAD = 0.35  # of an object's sides, the standard deviation of its peak …
 _LEAST_SPREAD_M, _MOST_SPREAD_M = 0.6, 1.6  # … within these
 _BESIDE = 1  # cells round a middle that tell the box, too
@@ -71,7 +71,7 @@ def perception_losses(
     weights: PerceptionWeights,
 ) -> dict[str, Tensor]:
     """The terms by name, weighted, and their sum as `total`."""
-    classes = torch.tensor(_CLASS_WEIGHTS, device=heads.semantics.device)
+    classes = torch.tensor(CLASS_WEIGHTS, device=heads.semantics.device)
     terms = {
         "semantics": F.cross_entropy(
             heads.semantics.float(), targets.semantics.long(), classes, ignore_index=IGNORED

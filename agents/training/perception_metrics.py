@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from agents.driveinsight.heads import CLASS_OF_KIND, Heads, ObjectClass
 from agents.driveinsight.perception_losses import IGNORED, PerceptionTargets
 from agents.driveinsight.reading import read_seen
-from agents.driveinsight.semantics import BevClass
+from agents.driveinsight.semantics import BevClass, likeliest
 from agents.networks.grid import GridConfig
 from di_envs.world.kinds import ActorKind
 
@@ -77,7 +77,7 @@ def perception_sums(heads: Heads, targets: PerceptionTargets, grid: GridConfig) 
 
 def _overlaps(heads: Heads, targets: PerceptionTargets, grid: GridConfig) -> Counter[str]:
     """Cells that hold a class in both maps, and in either: of all, and of those nearby."""
-    said, true = heads.semantics.argmax(dim=1), targets.semantics.long()
+    said, true = likeliest(heads.semantics), targets.semantics.long()
     step = torch.arange(grid.cells, device=said.device) + 0.5
     x, y = grid.x_min_m + step * grid.cell_x_m, grid.y_min_m + step * grid.cell_y_m
     near = torch.hypot(x[:, None], y) <= VEHICLES_M

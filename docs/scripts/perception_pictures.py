@@ -21,6 +21,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from agents.driveinsight.reading import read_seen
+from agents.driveinsight.semantics import likeliest
 from agents.driveinsight.weights import from_pretrained
 from agents.networks.grid import GridConfig
 from agents.training.frames import read_drive
@@ -89,7 +90,7 @@ def draw(policy_folder: Path, drives: Path, rows: int) -> None:
         truth = np.minimum(targets.semantics[-1].numpy(), len(_COLOURS) - 1)
         draw_map(axes[1], truth, grid, "what is there (boxes: in sight; pale: hidden)")
         draw_rows(axes[1], targets.objects[-1].numpy(), targets.signal[-1:].numpy(), 1.0)
-        draw_map(axes[2], heads.semantics[-1].argmax(dim=0).numpy(), grid, "what is seen")
+        draw_map(axes[2], likeliest(heads.semantics[-1:])[0].numpy(), grid, "what is seen")
         draw_rows(axes[2], seen.objects[-1].numpy(), seen.signals[-1].numpy(), SCORE)
     figure.savefig(PICTURE, dpi=110)
 
