@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+
+from typing_extensions import Self
 
 from agents.driveinsight.agent import requirements_of
 from agents.driveinsight.config import PolicyConfig
