@@ -32,7 +32,7 @@ from wrappers.interventions import EDITS, ObservationEditing
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
-PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard")
+PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard", "driveinsight")
 FOLDERS = (*PACKAGES, "tests", "docs", "examples", "benchmarks")
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
@@ -120,6 +120,32 @@ def test_the_python_of_the_page_on_interventions_runs(number, tmp_path):
         timeout=300,
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(TOP)},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+ALONE = [
+    (page, number)
+    for page in ("environments", "python")
+    for number in range(len(blocks((TOP / "docs" / f"{page}.md").read_text("utf-8"), "python")))
+]
+
+
+@pytest.mark.parametrize(("page", "number"), ALONE)
+def test_each_snippet_of_these_pages_runs_alone(page, number, tmp_path):
+    code = blocks((TOP / "docs" / f"{page}.md").read_text("utf-8"), "python")[number]
+    code = code.replace("num_envs=16", "num_envs=2").replace(
+        "while env.agents:", "for _ in range(3):"
+    )
+    (tmp_path / "snippet.py").write_text(code, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "snippet.py"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
 
