@@ -28,12 +28,14 @@ from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
 from leaderboard.commands.cli import Command, Evaluate
 from leaderboard.commands.train import Train
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import Job, RunSpec
 from wrappers.interventions import EDITS, ObservationEditing
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
-PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard", "driveinsight")
-FOLDERS = (*PACKAGES, "tests", "docs", "examples", "benchmarks")
+PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard")
+FOLDERS = (*PACKAGES, "driveinsight", "tests", "docs", "examples", "benchmarks")
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
@@ -83,6 +85,15 @@ def test_the_readmes_python_runs(number):
 def test_the_python_of_the_page_on_branching_runs():
     (code,) = blocks(BRANCHING, "python")
     exec(code, {})  # our own text
+
+
+def test_the_page_on_branching_says_who_is_hit_when():
+    spec = RunSpec(agent="expert-blind", options={"suite": "town05_tiny", "route_ids": ("60",)})
+    with Driver(spec) as driver:
+        record = driver.drive(Job(index=0, route_id="60", seed=0))
+    (hit,) = (event for event in record.events if event.kind == EventKind.COLLISION_VEHICLE)
+    assert f"actor {hit.other}, {hit.time_s:g} s into the drive" in " ".join(BRANCHING.split())
+    assert hit.other_type == "vehicle.bus"
 
 
 def test_the_edits_of_the_page_on_branching_can_be_read():

@@ -23,6 +23,7 @@ def driven(*arguments: str, first: str = "", code: str = "from driveinsight impo
         capture_output=True,
         text=True,
         check=False,
+        cwd=TOP.anchor,  # Python looks where it is called first
         env={**os.environ, "PYTHONPATH": path},
         timeout=300,
     )
