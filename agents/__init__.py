@@ -199,6 +199,12 @@ SCHEMES: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "pickled": AgentEntry(
+        entry_point="agents.pickled:PickledAgent",
+        summary="pickled:FILE.pickle: a class or an instance that `leaderboard.evaluate` was given",
+        version=1,
+        packages=("highway-env", "stable-baselines3", "torch"),
+    ),
     "sb3": AgentEntry(
         entry_point="agents.sb3.agent:Sb3Agent",
         summary="sb3:FILE.zip[?control_dt_s=0.2]: a model that Stable-Baselines3 saved",

@@ -21,6 +21,7 @@ from agents.faults import agents_code, as_control, describe
 from agents.generators import generators
 from agents.processes import leave_warnings_to_parent, live_for_parent
 from agents.shared_arrays import Receiver
+from agents.versions import loaded_packages
 from di_envs.edits.text import EditError, read_edit
 from di_envs.files.plain_text import one_plain_line
 from di_envs.sensors.carla_suite import SensorSuiteError
@@ -102,6 +103,10 @@ class _Hosted:
     def requires(self) -> dict[str, Any]:
         """What it requires."""
         return Requirements.agreed(self._made.requires).as_json()
+
+    def loaded(self) -> dict[str, Any]:
+        """Which packages are loaded that its decisions may rest on."""
+        return {"packages": loaded_packages()}
 
     def edited(self, texts: list[str]) -> dict[str, Any]:
         """Puts the agent, edited inside, in its own place."""

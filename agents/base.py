@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import Self
 
 from di_envs.files.json_values import from_json, to_json
 from di_envs.files.names import name_hint
+from di_envs.files.text_enum import TextEnum
 from di_envs.sensors.camera.config import Rig
 from di_envs.sensors.lidar.config import LidarConfig
 from di_envs.town.plan import RoutePlan
@@ -27,7 +28,7 @@ Memory = TypeVar("Memory")
 SENSOR_OPTIONS: Mapping[str, Any] = {"cameras": str | Rig, "lidar": str | LidarConfig}
 
 
-class Track(StrEnum):
+class Track(TextEnum):
     """What an agent may use; printed with every result."""
 
     PROMPT = "PROMPT"

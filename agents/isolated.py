@@ -164,6 +164,10 @@ class IsolatedAgent:
         """What it requires, checked."""
         return Requirements.of_json(self._process.ask("requires"))
 
+    def loaded(self) -> tuple[str, ...]:
+        """`agents.versions.loaded_packages` of its process."""
+        return tuple(map(str, self._process.ask("loaded").get("packages", ())))
+
     @property
     def edited(self) -> Any:
         """Makes it one that is edited inside; an AttributeError where the agent does not offer it.

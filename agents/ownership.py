@@ -13,6 +13,7 @@ from agents import AGENTS, SCHEMES
 
 # The schemes whose files are numbers and text: policies of ours, systems of the zoo
 _DATA_ONLY = ("driveinsight", "zoo")
+PICKLES = ("sb3", "pickled")  # those whose files run code as they are loaded
 _OURS = {*AGENTS, *(entry.entry_point for entry in AGENTS.values())}
 
 
@@ -21,7 +22,7 @@ def code_of_others(spec: str) -> str:
     scheme, _, place = spec.partition(":")
     if spec in _OURS or not place or scheme in _DATA_ONLY:
         return ""
-    if scheme == "sb3":
+    if scheme in PICKLES:
         return f"the pickles in {_file_of(place)}"
     if scheme in SCHEMES:
         return f"the file {_file_of(place)}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -37,14 +37,28 @@ def agent_version(spec: str) -> str:
     return f"file {_hash([_code_of(spec.rpartition(':')[0])])}"
 
 
-def agent_packages(spec: str) -> tuple[str, ...]:
-    """Packages whose version can change a bit of what the agent does, beside the world's own."""
+def agent_packages(spec: str, loaded: Collection[str] | None = None) -> tuple[str, ...]:
+    """Packages whose version can change a bit of what the agent does, beside the world's own.
+
+    Args:
+        spec: See `agents.load_agent`.
+        loaded: `loaded_packages` where such an agent was made; None where none was. Of those that
+            code of others may load, the others do not count then.
+    """
     entry = AGENTS.get(named(spec)[0]) or SCHEMES.get(spec.partition(":")[0])
-    return entry.packages if entry is not None else OF_OTHERS
+    packages = entry.packages if entry is not None else OF_OTHERS
+    if packages == OF_OTHERS and loaded is not None:
+        return tuple(name for name in packages if name in loaded)
+    return packages
 
 
 # Code of others may load any of these, and does not say so
 OF_OTHERS = SCHEMES["carla"].packages
+
+
+def loaded_packages() -> tuple[str, ...]:
+    """Those of `OF_OTHERS` that this process has loaded."""
+    return tuple(name for name in OF_OTHERS if name.replace("-", "_") in sys.modules)
 
 
 def _declared(name: str, entry: AgentEntry, places: Sequence[Path]) -> str:

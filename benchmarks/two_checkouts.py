@@ -12,9 +12,9 @@ import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Self
 
 from step_works import GROWTH
+from typing_extensions import Self
 
 WORKS = Path(__file__).with_name("step_works.py")
 HERE = WORKS.resolve().parents[1]

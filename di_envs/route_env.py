@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from typing_extensions import Self
 
 from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import WEATHERS, check_name

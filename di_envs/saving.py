@@ -72,6 +72,9 @@ def save(env: Wrapped) -> EnvSnapshot:
 def restore(env: Wrapped, snapshot: EnvSnapshot) -> None:
     """Puts an environment and its wrappers back to where they were, or a twin of them there.
 
+    What is seen is a part of it: a snapshot brings along the weather that it was taken in, also
+    into an environment made with another `weather=`; `env.unwrapped.change_weather` changes it.
+
     Args:
         env: The environment that was saved, or one made in the same way.
         snapshot: What `save` returned.

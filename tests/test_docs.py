@@ -28,12 +28,14 @@ from di_envs.suites import suite_names
 from di_envs.world.state import EVENT_KINDS, EventKind
 from leaderboard.commands.cli import Command, Evaluate
 from leaderboard.commands.train import Train
+from leaderboard.running.driver import Driver
+from leaderboard.running.jobs import Job, RunSpec
 from wrappers.interventions import EDITS, ObservationEditing
 
 TOP = Path(__file__).resolve().parent.parent
 PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *TOP.glob("benchmarks/*.md")])
 PACKAGES = ("di_envs", "agents", "wrappers", "leaderboard")
-FOLDERS = (*PACKAGES, "tests", "docs", "examples", "benchmarks")
+FOLDERS = (*PACKAGES, "driveinsight", "tests", "docs", "examples", "benchmarks")
 BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
@@ -85,6 +87,15 @@ def test_the_python_of_the_page_on_branching_runs():
     exec(code, {})  # our own text
 
 
+def test_the_page_on_branching_says_who_is_hit_when():
+    spec = RunSpec(agent="expert-blind", options={"suite": "town05_tiny", "route_ids": ("60",)})
+    with Driver(spec) as driver:
+        record = driver.drive(Job(index=0, route_id="60", seed=0))
+    (hit,) = (event for event in record.events if event.kind == EventKind.COLLISION_VEHICLE)
+    assert f"actor {hit.other}, {hit.time_s:g} s into the drive" in " ".join(BRANCHING.split())
+    assert hit.other_type == "vehicle.bus"
+
+
 def test_the_edits_of_the_page_on_branching_can_be_read():
     texts = [line.split("`")[1] for line in BRANCHING.splitlines() if line.startswith("| `")]
     named = {f"{edit.verb}:{edit.target}" for text in texts for edit in read_edits(text)}
@@ -120,6 +131,32 @@ def test_the_python_of_the_page_on_interventions_runs(number, tmp_path):
         timeout=300,
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(TOP)},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+ALONE = [
+    (page, number)
+    for page in ("environments", "python")
+    for number in range(len(blocks((TOP / "docs" / f"{page}.md").read_text("utf-8"), "python")))
+]
+
+
+@pytest.mark.parametrize(("page", "number"), ALONE)
+def test_each_snippet_of_these_pages_runs_alone(page, number, tmp_path):
+    code = blocks((TOP / "docs" / f"{page}.md").read_text("utf-8"), "python")[number]
+    code = code.replace("num_envs=16", "num_envs=2").replace(
+        "while env.agents:", "for _ in range(3):"
+    )
+    (tmp_path / "snippet.py").write_text(code, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "snippet.py"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
 

@@ -43,6 +43,7 @@ FLOORS = {
         {"tables"},
         {"pages"},
         {"commands"},
+        {"api"},
         {""},
     ),
 }

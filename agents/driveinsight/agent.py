@@ -9,10 +9,10 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
 
 import torch
 from torch import Tensor
+from typing_extensions import Self
 
 from agents import AgentSpecError
 from agents.base import Control, Observation, Requirements

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
+
+from typing_extensions import Self
 
 from agents.networks.grid import WIDE_GRID, GridConfig
 from agents.networks.sizes import LARGEST, check_sizes

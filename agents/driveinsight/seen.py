@@ -8,10 +8,10 @@ a row is there, perception says how sure it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import torch
 from torch import Tensor
+from typing_extensions import Self
 
 OBJECTS = 24
 OBJECT_COLUMNS = 9

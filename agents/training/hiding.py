@@ -10,7 +10,9 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
+
+from typing_extensions import Self
 
 from agents.base import Agent, Control, Observation, Requirements
 from agents.driveinsight.config import BEV, TOKENS

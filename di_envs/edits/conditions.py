@@ -12,7 +12,9 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
+
+from typing_extensions import Self
 
 from di_envs.config import check_name
 from di_envs.edits.text import EditError

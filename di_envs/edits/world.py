@@ -13,7 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Protocol
+
+from typing_extensions import Self
 
 from di_envs.config import WEATHERS, check_name
 from di_envs.edits.conditions import number_text

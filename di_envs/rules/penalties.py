@@ -8,15 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
 
+from di_envs.files.text_enum import TextEnum
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 
 
-class Form(StrEnum):
+class Form(TextEnum):
     """How infractions combine."""
 
     PRODUCT = "product"  # the score is multiplied by each one's factor

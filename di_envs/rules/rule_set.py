@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from types import MappingProxyType
 from typing import ClassVar
 
+from di_envs.files.text_enum import TextEnum
 from di_envs.rules.penalties import Penalties
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
@@ -39,7 +39,7 @@ NOT_CARLAS = frozenset(
 )
 
 
-class Layout(StrEnum):
+class Layout(TextEnum):
     """Whose `results.json` a run's is like."""
 
     V1 = "1.0"

@@ -17,15 +17,15 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 from di_envs.files.names import name_hint
+from di_envs.files.text_enum import TextEnum
 from di_envs.sensors.camera.config import CameraConfig, Rig
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 
 
-class SensorType(StrEnum):
+class SensorType(TextEnum):
     """CARLA's names of the sensors that the Leaderboard allows."""
 
     CAMERA = "sensor.camera.rgb"

@@ -38,7 +38,27 @@ def see(moment: RouteEnv, **options: Any) -> dict[str, Any]:
     """What an agent with other sensors would see at the same moment."""
     env = RouteEnv(suite="town05_long", **options)
     env.restore_state(moment.save_state())
+    if "weather" in options:
+        env.change_weather(options["weather"])  # the snapshot has brought its own along
     return env.observe()
+
+
+def weather_rows(moment: RouteEnv) -> list[Image.Image]:
+    """The four cameras in each weather, one row after the other.
+
+    Raises:
+        ValueError: If two weathers look the same.
+    """
+    rows: dict[bytes, str] = {}
+    tiles = []
+    for name in WEATHERS:
+        seen = see(moment, observations=("camera",), cameras="paper", weather=name)
+        row = b"".join(seen[camera].tobytes() for camera in NAMES)
+        if row in rows:
+            raise ValueError(f"{name} looks as {rows[row]} does, to the bit: nothing changed it")
+        rows[row] = name
+        tiles += [tile(seen[camera], SMALL) for camera in NAMES]
+    return tiles
 
 
 def tile(picture: NDArray[np.uint8], size: tuple[int, int] = TILE) -> Image.Image:
@@ -145,10 +165,6 @@ def main() -> None:
     page = Image.new("RGB", (cameras.width + SWEEP_PX, cameras.height))
     page.paste(cameras, (0, 0))
     page.paste(sweep(seen["lidar"]), (cameras.width, 0))
-    weathers = []
-    for name in WEATHERS:
-        seen = see(moment, observations=("camera",), cameras="paper", weather=name)
-        weathers += [tile(seen[camera], SMALL) for camera in NAMES]
     views = []
     for pose in places(moment).values():
         seen = see(moved(moment, pose), observations=("camera",), cameras="paper")
@@ -164,7 +180,7 @@ def main() -> None:
     ]
     for name, picture in (
         ("sensors.jpg", page),
-        ("weathers.jpg", sheet(weathers, columns=4)),
+        ("weathers.jpg", sheet(weather_rows(moment), columns=4)),
         ("places.jpg", sheet(views, columns=2)),
         ("images.jpg", sheet(kinds, columns=2)),
     ):

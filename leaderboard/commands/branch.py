@@ -71,7 +71,7 @@ class Branch:
             edits = read_world_edits(self.world)
             run = trusted_run(read_run(self.folder), agent=self.agent, trust=self.trust)
             record = chosen_route(run, self.route, self.seed)
-            folder = self.output or self._new_folder()
+            folder = self.output or new_folder(self.folder, self.route, self.at)
             prepare_folder(folder, overwrite=self.overwrite)
         except (EditError, ResultsError, RouteChoiceError) as error:
             raise UsageError(str(error)) from error
@@ -104,12 +104,13 @@ class Branch:
         )
         return EXIT_CRASHED if futures.edited.lost else 0
 
-    def _new_folder(self) -> Path:
-        """`RUN/branch-ROUTE-SECONDS`, or -2 and so on where that is taken."""
-        from di_envs.files.plain_text import file_name
 
-        name = f"branch-{file_name(self.route)}-{self.at:g}s"
-        folder, number = self.folder / name, 2
-        while folder.exists():
-            folder, number = self.folder / f"{name}-{number}", number + 1
-        return folder
+def new_folder(run: Path, route_id: str, at_s: float) -> Path:
+    """`RUN/branch-ROUTE-SECONDS`, or -2 and so on where that is taken."""
+    from di_envs.files.plain_text import file_name
+
+    name = f"branch-{file_name(route_id)}-{at_s:g}s"
+    folder, number = run / name, 2
+    while folder.exists():
+        folder, number = run / f"{name}-{number}", number + 1
+    return folder

@@ -21,6 +21,7 @@ from leaderboard.commands.ablate import ABLATE_HELP, Ablate
 from leaderboard.commands.branch import BRANCH_HELP, Branch
 from leaderboard.commands.collect import COLLECT_HELP, Collect
 from leaderboard.commands.compare import COMPARE_HELP, Compare
+from leaderboard.commands.doctor import DOCTOR_HELP, Doctor
 from leaderboard.commands.drive import DRIVE_HELP, Drive
 from leaderboard.commands.edit import EDIT_HELP, Edit
 from leaderboard.commands.ending import (
@@ -54,7 +55,8 @@ First steps:
   driveinsight explain results/expert-town05_tiny --route 0   why it drove one so, and what if
   driveinsight verify results/expert-town05_tiny          does the claim stand?
   driveinsight drive --agent expert --suite town05_tiny --video out.mp4
-  driveinsight collect                                    data to train a policy of your own"""
+  driveinsight collect                                    data to train a policy of your own
+  driveinsight doctor                                     is all there? what to do if not"""
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_HELP)]
@@ -74,6 +76,7 @@ Command = (
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
+    | Annotated[Doctor, tyro.conf.subcommand("doctor", description=DOCTOR_HELP)]
 )
 
 

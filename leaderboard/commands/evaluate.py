@@ -61,7 +61,7 @@ class Evaluate(EngineArguments, SceneArguments):
         if self.overwrite and self.resume:
             raise UsageError("--overwrite and --resume exclude each other: choose one")
         options, suite = self.choose(self.route_ids)
-        folder = self.output or self._default_folder(suite.name)
+        folder = self.output or default_folder(self.agent, suite.name, last=self.resume)
 
         from leaderboard.records.results import ResultsError
         from leaderboard.running.interruption import interruptible
@@ -90,7 +90,7 @@ class Evaluate(EngineArguments, SceneArguments):
             raise UsageError(str(error)) from error
         finally:
             if new:
-                _remove_if_empty(folder)
+                remove_if_empty(folder)
         _print_run(run, folder)
         if not run.complete:
             return EXIT_INTERRUPTED
@@ -103,15 +103,6 @@ class Evaluate(EngineArguments, SceneArguments):
             return Existing.RESUME
         return Existing.OVERWRITE if self.overwrite else Existing.REFUSE
 
-    def _default_folder(self, suite: str) -> Path:
-        """`results/AGENT-SUITE`, or -2 and so on where that is taken; the last one to resume."""
-        name = f"{plain_name(self.agent)}-{plain_name(suite)}"
-        folder, number = Path("results") / name, 2
-        last = folder
-        while folder.exists():
-            last, folder, number = folder, Path("results") / f"{name}-{number}", number + 1
-        return last if self.resume else folder
-
 
 def plain_name(name: str) -> str:
     """A name that can be part of a folder's: `path/to/mine.py:MyAgent` becomes `MyAgent`."""
@@ -120,7 +111,24 @@ def plain_name(name: str) -> str:
     return file_name(name.rpartition(":")[2].replace("/", "_"))
 
 
-def _remove_if_empty(folder: Path) -> None:
+def default_folder(agent: str, suite: str, *, last: bool) -> Path:
+    """`results/AGENT-SUITE`, or -2 and so on where that is taken.
+
+    Args:
+        agent: Its name.
+        suite: Where it drives.
+        last: The last one that there is, to go on with it.
+    """
+    name = f"{plain_name(agent)}-{plain_name(suite)}"
+    folder, number = Path("results") / name, 2
+    found = folder
+    while folder.exists():
+        found, folder, number = folder, Path("results") / f"{name}-{number}", number + 1
+    return found if last else folder
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Leaves no empty folder behind where nothing could be driven."""
     if folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
 
@@ -141,8 +149,11 @@ def _next_steps(run: RunRecord, folder: Path) -> list[str]:
     where = typed(folder)
     if run.lost or not run.complete:
         return [f"Next: the same command with --output {where} --resume drives what is missing"]
+    route = typed(run.scored[0].route_id)
     return [
-        f"Next: driveinsight show {where}",
+        f"Next: driveinsight report {where}       a page with a replay of each route",
+        f"      driveinsight explain {where} --route {route}       why it drove one so",
         f"      driveinsight verify {where}       does the claim stand?",
         f"      driveinsight compare {where} OTHER",
+        f"      driveinsight show {where}       this table again",
     ]

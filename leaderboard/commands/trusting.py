@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from agents.ownership import PICKLES
 from leaderboard.commands.ending import UsageError
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def check_model(agent: str, *, trust: bool) -> None:
     """
     scheme, _, place = agent.partition(":")
     path = Path(place.partition("?")[0])
-    if scheme != "sb3" or not path.is_file() or _is_own(path):
+    if scheme not in PICKLES or not path.is_file() or _is_own(path):
         return
     from di_envs.files.caches import cache_folders
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from importlib.metadata import PackageNotFoundError, version
 
 from agents.versions import agent_packages
@@ -15,14 +15,15 @@ WORLD = "world"  # beside them, what our own world is called
 INFORMATION = ("python", "driveinsight")  # written down, and no obstacle
 
 
-def package_versions(agent: str = "") -> Mapping[str, str]:
+def package_versions(agent: str = "", loaded: Collection[str] | None = None) -> Mapping[str, str]:
     """Versions of Python, of our world, and of the packages that there are of those that count.
 
     Args:
         agent: Specification of the agent that drives; empty where nobody but the world does.
+        loaded: What one of that specification has loaded; None where that is not known.
     """
     found = {"python": platform.python_version()}
-    packages = (*PACKAGES, *(agent_packages(agent) if agent else ()))
+    packages = (*PACKAGES, *(agent_packages(agent, loaded) if agent else ()))
     for package in ("driveinsight", *packages):
         try:
             found[package] = version(package)

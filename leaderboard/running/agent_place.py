@@ -8,6 +8,7 @@ from agents import load_agent
 from agents.base import Agent, Requirements
 from agents.isolated import AgentProcess, IsolatedAgent
 from agents.ownership import code_of_others
+from agents.versions import loaded_packages
 from leaderboard.running.episode import close_agent
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.wall_clock import WHERE_SIGNAL, Stopwatch
@@ -18,6 +19,7 @@ class AgentPlace:
 
     def __init__(self, spec: RunSpec, watch: Stopwatch) -> None:
         self._spec, self._watch = spec, watch
+        self.loaded: tuple[str, ...] | None = None  # by the first that was asked, see `versions`
         self._process: AgentProcess | None = None
         if drives_apart(spec):
             self._process = AgentProcess(watch.place, WHERE_SIGNAL)
@@ -43,6 +45,7 @@ class AgentPlace:
             close_agent(agent)
             self.agree(requires)
             agent = self.make()
+        self.loaded = agent.loaded() if isinstance(agent, IsolatedAgent) else loaded_packages()
         return agent, requires
 
     def agree(self, requires: Requirements) -> None:

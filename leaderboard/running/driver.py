@@ -47,6 +47,11 @@ class Driver:
         self.interventions = sort_interventions(spec.interventions, space)
         self._shown = self.interventions.around(self.env)
 
+    @property
+    def loaded(self) -> tuple[str, ...] | None:
+        """Packages that making the agent loaded; None if none was made, as it was known."""
+        return self._place.loaded
+
     def drive(self, job: Job, moved: Callable[[], None] = lambda: None) -> RouteRecord:
         """Drives one route; never raises for what the agent does.
 

@@ -96,7 +96,7 @@ def run_facts(driver: Driver) -> RunFacts:
         town_hash=town.content_hash,
         route_ids=tuple(driver.env.route_ids),
         routes_hash=routes.hexdigest(),
-        versions=package_versions(driver.spec.agent),
+        versions=package_versions(driver.spec.agent, driver.loaded),
         cpu=cpu_capability(),
         world=content_of(suite_of(driver.spec.options)),
         refused=planned.refused,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Self
 
 from torch import nn
+from typing_extensions import Self
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.trainees import Trainee

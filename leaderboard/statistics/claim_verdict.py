@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
+from di_envs.files.text_enum import TextEnum
 
 
-class ClaimVerdict(StrEnum):
+class ClaimVerdict(TextEnum):
     """What became of a finding of somebody else's."""
 
     HOLDS = "holds"

@@ -61,7 +61,7 @@ def _route_table(run: RunRecord) -> Table:
         table.add_row(escape(route_id), *blank, escape(f"could not be planned: {reason}"))
     table.add_section()
     driving, *cells = _mean_cells(run)
-    own = [str(driving_interval(ours))] if ours else []
+    own = [_stacked(driving_interval(ours))] if ours else []
     table.add_row("mean", driving, *own, *cells, style="bold")
     return table
 
@@ -105,15 +105,20 @@ def _mean_cells(run: RunRecord) -> list[str]:
     penalty = mean_interval(seed_means(run.scored, "infraction_score", run.seeds))
     penalty_text = f"{penalty.mean:.2f}"
     if penalty.half_width is not None:
-        penalty_text += f" ± {penalty.half_width:.2f}"
+        penalty_text += f"\n± {penalty.half_width:.2f}"
     return [
-        str(driving_interval(run)),
-        str(completion),
+        _stacked(driving_interval(run)),
+        _stacked(completion),
         penalty_text,
         _bound_cell(run.scored),
         f"{scored_per_km(run.scored, run):.2f}",
         "",
     ]
+
+
+def _stacked(interval: MeanInterval) -> str:
+    """A mean with its doubt below it: eight columns have to fit into a narrow terminal."""
+    return str(interval).replace(" ± ", "\n± ")
 
 
 def driving_interval(run: RunRecord) -> MeanInterval:

@@ -18,11 +18,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
+from typing_extensions import Self
 
 from di_envs.edits.conditions import ALWAYS, Condition, number_text
 from di_envs.edits.text import EditError, EditText

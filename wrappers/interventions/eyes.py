@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any
+
+from typing_extensions import Self
 
 from wrappers.interventions.context import EditContext
 from wrappers.interventions.editing import Memory, ObservationEditing

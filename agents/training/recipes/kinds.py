@@ -10,17 +10,17 @@ import hashlib
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from agents.training.collect import drive_paths
+from di_envs.files.text_enum import TextEnum
 
 POLICY_FOLDER = "policy"  # of a stage that makes one
 SEEN_FOLDER = "seen"  # of one that looks at drives
 
 
-class Product(StrEnum):
+class Product(TextEnum):
     """What a stage leaves in its folder for those behind it."""
 
     DRIVES = "drives"

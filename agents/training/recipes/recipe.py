@@ -32,7 +32,7 @@ What a stage names must come before it, so there is one order, and no stage can 
 from __future__ import annotations
 
 import re
-import tomllib
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -43,6 +43,11 @@ from agents.training.recipes.kinds import StageKind
 from agents.training.recipes.table import STAGE_KINDS
 from di_envs.files.json_values import JsonError, from_json
 from di_envs.files.names import check_name, name_hint
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 DRIVES_A_STAGE = 10_000  # numbers of drives that each stage which drives has to itself, in a town
 MOST_ROUNDS = 100

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from di_envs.files.json_values import from_json, read_json
+from di_envs.files.text_enum import TextEnum
 from di_envs.town.building.alignment import Curve, rounded_polyline
 
 LANE_WIDTH_M = 3.5
 
 
-class Control(StrEnum):
+class Control(TextEnum):
     """Who may go at a junction."""
 
     LIGHTS = "lights"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import TaskID
+from typing_extensions import Self
 
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.displays.run import RunDisplay

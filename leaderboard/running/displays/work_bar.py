@@ -7,7 +7,6 @@ name theirs. Displays of a run, a study and a training are made of it.
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.progress import (
@@ -19,7 +18,9 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from typing_extensions import Self
 
+from leaderboard.running.displays.notebook import CellProgress, in_notebook
 from leaderboard.running.terminal import Terminal
 
 LOOK_BACK_S = 300.0  # work goes in bursts: a rate over half a minute, rich's own, jumps about
@@ -44,7 +45,8 @@ def work_bar(
         look_back_s: The remaining time goes by the rate over so long.
     """
     numbers = [MofNCompleteColumn(), TextColumn(unit)]
-    return Progress(
+    kind = CellProgress if in_notebook() else Progress
+    return kind(
         TextColumn(f"  {what}"),
         BarColumn(bar_width=30),
         *([TaskProgressColumn()] if unit == "%" else numbers),

@@ -262,8 +262,12 @@ print("shown")
 """
 
 
+# Where programs, packages and caches are
+_KEPT = ("PATH", "HOME", "PYTHONPATH", "XDG_CACHE_HOME", "DRIVEINSIGHT_CACHE")
+
+
 def run_with(**environment):
-    kept = {name: os.environ[name] for name in ("PATH", "HOME", "PYTHONPATH") if name in os.environ}
+    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
     return subprocess.run(
         [sys.executable, "-c", OPEN_A_WINDOW],
         env={**kept, **environment},

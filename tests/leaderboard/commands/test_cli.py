@@ -108,7 +108,8 @@ def test_evaluate_ends_in_a_table_and_names_the_next_step(capsys, tmp_path):
     assert main([*arguments, "--output", str(folder)]) == 0
     shown = capsys.readouterr().out
     assert "constant on toy · track PROMPT · rules carla-1.0" in shown
-    assert f"Next: driveinsight show {folder}" in shown
+    for command in ("report", "explain", "verify", "compare", "show"):
+        assert f"driveinsight {command} {folder}" in shown
     assert [record.seed for record in read_run(folder).routes] == [0, 1]
 
     assert main(["show", str(folder)]) == 0

@@ -137,6 +137,10 @@ def test_torch_counts_below_those_drivers_only_that_load_it():
     # who knows what other people's code loads
     for spec in ("mine.py:Mine", "mine:Mine", "carla:mine.py"):
         assert {"torch", "highway-env", "stable-baselines3"} <= footing_here(spec).keys()
+        # until one was made, which has loaded them or not
+        assert "torch" not in versions.package_versions(spec, loaded=())
+        assert agent_packages(spec, loaded=("torch", "highway-env")) == ("highway-env", "torch")
+    assert agent_packages("driveinsight", loaded=()) == ("torch",)  # ours say so themselves
 
 
 def test_what_only_one_driver_rests_on_is_no_difference_between_their_worlds():

@@ -44,6 +44,15 @@ def test_what_an_agent_may_not_know_is_not_in_its_process():
     assert apart.done_m > 10.0
 
 
+def test_a_process_says_which_packages_its_agent_has_loaded():
+    process = AgentProcess()
+    try:
+        assert IsolatedAgent(process, "constant").loaded() == ()
+        assert IsolatedAgent(process, "highway").loaded() == ("highway-env",)
+    finally:
+        process.stop()
+
+
 @pytest.mark.parametrize("agent", ["SeesTheCamera", "DrawsFromAll"])
 def test_the_bits_are_the_same_in_this_process_and_in_one_of_its_own(agent):
     if agent == "DrawsFromAll":

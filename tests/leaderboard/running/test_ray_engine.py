@@ -126,6 +126,8 @@ def scene() -> RunFacts:
 )
 def test_a_machine_that_would_give_other_bits_is_refused(scene, fields, message):
     check_footing(scene, scene)
+    more = {**scene.versions, "torch": "1.0"}  # installed there; the agent has not loaded it
+    check_footing(scene, dataclasses.replace(scene, versions=more))
     with pytest.raises(SetupError, match=message):
         check_footing(scene, dataclasses.replace(scene, **fields))
 
