@@ -131,7 +131,8 @@ SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
         entry_point="agents.carla.agent:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
-        version=1,
+        version=2,
+        argument="file",
         packages=("highway-env", "stable-baselines3", "torch"),
     ),
     "driveinsight": AgentEntry(
