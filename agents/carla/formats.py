@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -103,7 +103,7 @@ def _data(
 def _image(
     sensor: CarlaSensor, observation: Mapping[str, Any], leaderboard: str
 ) -> NDArray[np.uint8]:
-    """The image of a camera; of a stitched one its three side by side, colours or tags alone."""
+    """What a sensor of images sees."""
     images = []
     for camera in sensor.cameras:
         name = camera.name
@@ -118,6 +118,11 @@ def _image(
                 images.append(instance_image(tags, observation[f"{name}_instance"]))
             case _:
                 images.append(bgra(observation[name]))
+    return _joined(sensor, images)
+
+
+def _joined(sensor: CarlaSensor, images: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """The image of a camera, or those of a stitched one side by side, colours or tags alone."""
     if sensor.type not in STITCHED:
         return images[0]
     row = np.concatenate(images, axis=1)
@@ -127,7 +132,7 @@ def _image(
 def _empty(sensor: CarlaSensor) -> Any:
     """What a sensor that cannot see says: its format, with nothing in it."""
     if sensor.type in IMAGES:
-        return empty_image(sensor.cameras[0])
+        return _joined(sensor, [empty_image(camera) for camera in sensor.cameras])
     if sensor.type == SensorType.SEMANTIC_LIDAR:
         return np.zeros(0, SEMANTIC_POINT)
     if sensor.type == SensorType.IMU:

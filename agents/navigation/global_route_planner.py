@@ -17,6 +17,7 @@ Trace = list[tuple[Any, RoadOption]]  # waypoints with what to do there
 CHANGE_M = 8.0  # that a lane change takes along the road
 CHANGE_COST_M = 10.0  # a change is worth a detour of so much
 STRAIGHT_RAD = math.radians(35.0)  # a way through a junction that turns less is straight on
+EDGE_M = 3.0  # into a junction, within which it is not told by a place which way through is meant
 MOST_PLACES = 50_000  # that are looked at before the search is given up
 
 
@@ -55,11 +56,12 @@ class GlobalRoutePlanner:
         start, goal = self._wmap.get_waypoint(origin), self._wmap.get_waypoint(destination)
         if start is None or goal is None:
             raise NoWayError(f"no lane is near {origin if start is None else destination}")
-        return with_turns(self._search(start, goal))
+        return with_turns(self._search(_beside_junction(start), _beside_junction(goal)))
 
     def _search(self, start: Any, goal: Any) -> Trace:
         """A* over places along lanes."""
-        end, known = goal.transform.location, {}
+        end = goal.transform.location
+        known: dict[tuple[int, int, int, int], float] = {}
         queue: list[tuple[float, int, float, Any, int, RoadOption]] = [
             (0.0, 0, 0.0, start, -1, RoadOption.LANEFOLLOW)
         ]
@@ -112,6 +114,17 @@ class GlobalRoutePlanner:
             return False
         far_m = waypoint.transform.location.distance(goal.transform.location)
         return bool(far_m <= 0.75 * self._resolution_m)
+
+
+def _beside_junction(waypoint: Any) -> Any:
+    """Just before or behind a junction for one at its edge: there all its lanes lie together."""
+    if not waypoint.is_junction:
+        return waypoint
+    for far_m in (0.5, 1.0, 2.0, EDGE_M):
+        for found in (waypoint.previous(far_m), waypoint.next(far_m)):
+            if found and not found[0].is_junction:
+                return found[0]
+    return waypoint
 
 
 def _way_back(reached: list[tuple[Any, int, RoadOption]], last: int) -> Trace:
