@@ -184,6 +184,10 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
         path, said = place_and_options(spec, place)
+        if entry.argument in said:
+            raise AgentSpecError(
+                f"agent '{spec}': the {entry.argument} stands before the '?', not behind it."
+            )
         given = {entry.argument: path, **said, **options}
         return _make(spec, entry.entry_point, {**entry.options, **given})
     if ":" not in spec:

@@ -15,6 +15,7 @@ from rich.console import Console
 from agents import AgentSpecError, load_agent
 from agents.base import Requirements, Track
 from agents.carla.agent import control_of
+from agents.carla.formats import with_origin
 from di_envs.route_env import RouteEnv
 from di_envs.suites import load_suite
 from leaderboard.records.record import AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID
@@ -159,7 +160,8 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
         town = driver.env.view.town
         calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
-    assert calls[-2] == town.opendrive  # the last call is destroy()
+    assert calls[-2] == with_origin(town.opendrive, (0.0, 0.0))  # the last call is destroy()
+    assert "lat_0=0.0" in calls[-2]
     with Driver(apart) as driver:
         again = driver.drive(Job(index=0, route_id="1", seed=0))
     assert again.fingerprint() == record.fingerprint()
@@ -275,6 +277,7 @@ def test_a_file_that_is_no_agent_says_what_is_missing(text, says, tmp_path):
         ("?leaderbord=2.1", "no option 'leaderbord'; did you mean 'leaderboard'"),
         ("?leaderboard=3", r"Unknown leaderboard '3'; .*known: 1\.0, 2\.0, 2\.1"),
         ("?config", "expected option=value"),
+        ("?file=other.py", "the file stands before the '.', not behind it"),
         ("?origin=here", "A map's origin is its latitude"),
         ("?limits=strict", "Unknown limits 'strict'"),
     ],
@@ -340,12 +343,12 @@ CONSTANTS = np.array([111324.60662786, 111319.490945])  # metres a degree, of ag
 
 
 @pytest.mark.parametrize(
-    ("query", "exact"), [("", True), ("?origin=0,0", True), ("?origin=map", False)]
+    ("query", "exact"), [("", True), ("?origin=0,0", True), ("?origin=49,8", False)]
 )
 def test_the_constants_of_agents_for_0_9_10_give_the_next_target_to_a_decimetre(
     query, exact, tmp_path
 ):
-    """North and east of 0, 0 as their planners count them; the toy town's origin is at 49, 8."""
+    """North and east of 0, 0 as their planners count them; from 49, 8 they would be wrong."""
     spec = written(tmp_path, GPS_BODY) + query
     agent = load_agent(spec)
     env = RouteEnv(**environment_options(QUIET, agent.requires))
