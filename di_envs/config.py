@@ -12,7 +12,7 @@ from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.geo_origin import checked_origin
 from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
-from di_envs.sensors.radar.config import RadarConfig, checked_radars
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig, checked_radars
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import TICK_S
 
@@ -109,7 +109,7 @@ class RouteEnvConfig:
     weather: str | None = None
     cameras: str | Rig = "small"
     lidar: str | LidarConfig = "paper"
-    radars: tuple[RadarConfig, ...] = (RadarConfig(name="radar_front"),)
+    radars: tuple[RadarConfig, ...] = FRONT_RADAR
     gnss_origin: tuple[float, float] | None = None
     control_dt_s: float = 0.1
     rules: str = "carla-1.0"

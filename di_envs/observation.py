@@ -26,7 +26,7 @@ from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 from di_envs.sensors.proximity import AHEAD_M, CONTACTS
-from di_envs.sensors.radar.config import RadarConfig
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig
 from di_envs.sensors.scene.tags import Tag
 from di_envs.town.lanes import LightState
 from di_envs.town.map_chunks import POINTS, MapKind
@@ -70,7 +70,7 @@ def observation_space(
     groups: tuple[str, ...],
     cameras: str | Rig = "small",
     lidar: str | LidarConfig = "paper",
-    radars: tuple[RadarConfig, ...] = (),
+    radars: tuple[RadarConfig, ...] = FRONT_RADAR,
     *,
     half_sweeps: bool = False,
 ) -> spaces.Dict:

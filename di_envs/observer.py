@@ -31,7 +31,7 @@ from di_envs.sensors.inertial import fill_gnss, fill_imu
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 from di_envs.sensors.lidar.sweep import Lidar
 from di_envs.sensors.proximity import proximity_of
-from di_envs.sensors.radar.config import RadarConfig
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig
 from di_envs.sensors.radar.look import Radars
 from di_envs.sensors.route_weather import keyframes_of, weather_at
 from di_envs.sensors.weather import Weather, weather_of
@@ -97,7 +97,7 @@ class Observer:
         lidar: str | LidarConfig = "paper",
         half_sweeps: bool = False,
         weather: str | None = None,
-        radars: tuple[RadarConfig, ...] = (),
+        radars: tuple[RadarConfig, ...] = FRONT_RADAR,
         gnss_origin: tuple[float, float] | None = None,
     ) -> None:
         """Prepares to look.

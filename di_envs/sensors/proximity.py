@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.arrays import Float32, UInt8
+from di_envs.numerics.arrays import Float32, Int8
 from di_envs.town.lanes import Lanes
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import State
@@ -65,7 +65,7 @@ def obstacle_of(state: State, ego: int) -> Float32:
     return np.array([actor + 1, state.kind[actor], max(float(far[first]), 0.0)], np.float32)
 
 
-def across_line_of(state: State, lanes: Lanes, ego: int) -> UInt8:
+def across_line_of(state: State, lanes: Lanes, ego: int) -> Int8:
     """(1,) 1 while an ego's box lies across an edge of the lane that it is on, else 0.
 
     By its middle's offset and how it is turned on the lane. Inside junctions, where no lines are
@@ -73,14 +73,14 @@ def across_line_of(state: State, lanes: Lanes, ego: int) -> UInt8:
     """
     lane = int(state.lane[ego])
     if lane < 0 or lanes.junction[lane] >= 0:
-        return np.zeros(1, np.uint8)
+        return np.zeros(1, np.int8)
     share = float(state.lane_m[ego]) / float(lanes.spacing_m[lane])
     point = int(lanes.first[lane]) + min(max(round(share), 0), int(lanes.count[lane]) - 1)
     turn = float(state.yaw[ego]) - float(lanes.points[point, 3])
     half_m = abs(math.cos(turn)) * float(state.half_width[ego])
     half_m += abs(math.sin(turn)) * float(state.half_length[ego])
     over_m = abs(float(state.lateral_m[ego])) + half_m - 0.5 * float(lanes.width_m[point])
-    return np.array([over_m > 0.0], np.uint8)
+    return np.array([over_m > 0.0], np.int8)
 
 
 def _in_ego(

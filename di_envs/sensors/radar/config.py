@@ -82,6 +82,9 @@ class RadarConfig:
         return turn
 
 
+FRONT_RADAR = (RadarConfig(name="radar_front"),)  # where nobody says which
+
+
 def checked_radars(radars: Iterable[RadarConfig]) -> tuple[RadarConfig, ...]:
     """Radars that an ego can carry.
 

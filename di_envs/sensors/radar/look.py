@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from di_envs.numerics.arrays import Float32, Float64
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import bind, kernel
-from di_envs.numerics.keyed_random import uniform
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.sensors.radar.config import MOST_RADARS, RadarConfig
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.scene.scene import Scene, box_buffer, collect_boxes, scene_of
@@ -26,7 +26,7 @@ from di_envs.world.state import State
 from di_envs.world.world import WorldView
 
 _KEYS = 1 << 20  # draws kept apart for each radar of an ego
-_RADAR = 22
+_RADAR = int(Stream.RADAR)
 _NEAR_M = 0.2  # nothing nearer is met
 
 
