@@ -172,7 +172,8 @@ SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
         entry_point="agents.carla.agent:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
-        version=1,
+        version=2,
+        argument="file",
         packages=("highway-env", "stable-baselines3", "torch"),
     ),
     "driveinsight": AgentEntry(
@@ -240,6 +241,10 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
         path, said = place_and_options(spec, place)
+        if entry.argument in said:
+            raise AgentSpecError(
+                f"agent '{spec}': the {entry.argument} stands before the '?', not behind it."
+            )
         given = {entry.argument: path, **said, **options}
         return _make(spec, entry.entry_point, {**entry.options, **given})
     if ":" not in spec:

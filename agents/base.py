@@ -16,6 +16,7 @@ from di_envs.files.names import name_hint
 from di_envs.files.text_enum import TextEnum
 from di_envs.sensors.camera.config import Rig
 from di_envs.sensors.lidar.config import LidarConfig
+from di_envs.sensors.radar.config import RadarConfig
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import WorldView
 
@@ -25,7 +26,12 @@ Memory = TypeVar("Memory")
 
 # Options of its environment that an agent may ask for: where and among whom it is put to the test
 # is not for it to choose.
-SENSOR_OPTIONS: Mapping[str, Any] = {"cameras": str | Rig, "lidar": str | LidarConfig}
+SENSOR_OPTIONS: Mapping[str, Any] = {
+    "cameras": str | Rig,
+    "lidar": str | LidarConfig,
+    "radars": tuple[RadarConfig, ...],
+    "gnss_origin": tuple[float, float],
+}
 
 
 class Track(TextEnum):
@@ -106,7 +112,8 @@ class Requirements:
             return Track.PRIVILEGED
         if self.hd_map:
             return Track.MAP
-        if {"camera", "lidar"} & set(self.observations) or "prompt" not in self.observations:
+        asked = set(self.observations)
+        if {"camera", "lidar", "radar", "proximity"} & asked or "prompt" not in asked:
             return Track.SENSORS
         return Track.PROMPT
 

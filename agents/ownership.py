@@ -25,7 +25,7 @@ def code_of_others(spec: str) -> str:
     if scheme in PICKLES:
         return f"the pickles in {_file_of(place)}"
     if scheme in SCHEMES:
-        return f"the file {_file_of(place)}"
+        return f"the file {_file_of(place)}{_beside(place)}"
     return code_at(spec.rpartition(":")[0])
 
 
@@ -43,6 +43,14 @@ def code_at(place: str) -> str:
         found = None
     where = f" ({found.origin})" if found is not None and found.origin else ""
     return f"the module {place}{where}"
+
+
+def _beside(place: str) -> str:
+    """Folders from which a file imports besides, by its option `path`; empty without."""
+    said = place.partition("?")[2].split("&")
+    folders = [part.partition("=")[2] for part in said if part.startswith("path=")]
+    paths = [str(Path(folder).absolute()) for text in folders for folder in text.split(",")]
+    return f", and what it imports from {', '.join(paths)}" if paths else ""
 
 
 def _file_of(place: str) -> Path:

@@ -33,7 +33,8 @@ def agent_version(spec: str) -> str:
     scheme, _, place = spec.partition(":")
     if scheme in SCHEMES:
         path, options = place_and_options(spec, place)
-        return _declared(scheme, SCHEMES[scheme], [Path(p) for p in (path, *options.values())])
+        said = [part for value in options.values() for part in value.split(",")]
+        return _declared(scheme, SCHEMES[scheme], [Path(part) for part in (path, *said)])
     return f"file {_hash([_code_of(spec.rpartition(':')[0])])}"
 
 

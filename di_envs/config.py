@@ -12,11 +12,21 @@ from typing_extensions import Self
 from di_envs.files.names import check_name as check_name  # from here, too
 from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
+from di_envs.sensors.geo_origin import checked_origin
 from di_envs.sensors.lidar.config import SWEEP_S, LidarConfig, lidar_of
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig, checked_radars
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import TICK_S
 
-OBSERVATION_GROUPS = ("prompt", "inertial", "camera", "lidar", "odometry")
+OBSERVATION_GROUPS = (
+    "prompt",
+    "inertial",
+    "camera",
+    "lidar",
+    "odometry",
+    "radar",
+    "proximity",
+)
 # In place of a tuple of groups: the name of a preset, which chooses groups and the rig.
 OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
     "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}
@@ -66,7 +76,8 @@ class RouteEnvConfig:
         signals: Sidecar file or shipped name of a town's signals, or `synthesise`.
         scenarios: Name of a shipped trigger file, path of one in CARLA's JSON or of a folder of
             them, several with commas between, or `none`.
-        observations: Groups of observations: `camera`, `lidar`, `prompt`, `inertial`. Each camera
+        observations: Groups of observations: `camera`, `lidar`, `prompt`, `inertial`, `odometry`,
+            `radar`, `proximity`. Each camera
             costs its time, so name what is needed: `("prompt",)` alone steps many times faster.
             Or the name of a preset: `rl` is the prompt and the rig `rl`, one camera of 84 x 84.
         traffic: Number of other vehicles; without a suite that says it, by the length of lanes.
@@ -78,6 +89,9 @@ class RouteEnvConfig:
             one's own; for the group `camera`.
         lidar: Name of a LiDAR, `paper` (32 x 175 rays), `leaderboard` (64 x 937) or `dense`
             (32 x 1800), or a `LidarConfig` of one's own; for the group `lidar`.
+        radars: `RadarConfig`s with names of their own; for the group `radar`.
+        gnss_origin: Latitude and longitude [deg] of x = y = 0, by which GNSS counts; None for what
+            the town's map says.
         control_dt_s: Time for which an action is held, a multiple of the world tick of 0.05 s.
         rules: Name of the scoring rules; their penalties make the reward.
         terminate_on: Events that end the episode besides those by which the rules do, such as
@@ -97,6 +111,8 @@ class RouteEnvConfig:
     weather: str | None = None
     cameras: str | Rig = "small"
     lidar: str | LidarConfig = "paper"
+    radars: tuple[RadarConfig, ...] = FRONT_RADAR
+    gnss_origin: tuple[float, float] | None = None
     control_dt_s: float = 0.1
     rules: str = "carla-1.0"
     terminate_on: tuple[str, ...] = ()
@@ -111,6 +127,8 @@ class RouteEnvConfig:
                 f"suite={self.suite!r}, town={self.town!r}, routes={self.routes!r}."
             )
         self._check_names()
+        if self.gnss_origin is not None:
+            object.__setattr__(self, "gnss_origin", checked_origin(self.gnss_origin))
         for field in ("traffic", "walkers"):
             count = getattr(self, field)
             if count is not None and (isinstance(count, bool) or int(count) != count or count < 0):
@@ -160,6 +178,7 @@ class RouteEnvConfig:
         check_name(self.rules, RULES, "rules")
         rig_of(self.cameras)
         lidar_of(self.lidar)
+        object.__setattr__(self, "radars", checked_radars(self.radars))
 
     @property
     def control_ticks(self) -> int:

@@ -96,7 +96,11 @@ class Course:
         """The space of what an ego sees."""
         config = self.config
         return observation_space(
-            config.observations, config.cameras, config.lidar, half_sweeps=config.half_sweeps
+            config.observations,
+            config.cameras,
+            config.lidar,
+            config.radars,
+            half_sweeps=config.half_sweeps,
         )
 
     def observer(self) -> Observer:
@@ -109,6 +113,8 @@ class Course:
             lidar=config.lidar,
             half_sweeps=config.half_sweeps,
             weather=self.weather,
+            radars=config.radars,
+            gnss_origin=config.gnss_origin,
         )
 
     def ending(

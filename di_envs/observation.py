@@ -25,6 +25,8 @@ from di_envs.sensors.camera.cameras import FAR_M
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.inertial import IMU_LIMIT
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
+from di_envs.sensors.proximity import AHEAD_M, CONTACTS
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig
 from di_envs.sensors.scene.tags import Tag
 from di_envs.town.lanes import LightState
 from di_envs.town.map_chunks import POINTS, MapKind
@@ -39,6 +41,7 @@ _YAW = (-PI, PI)
 _SIZE = (0.0, 100.0)
 _SPEED = (-SPEED_LIMIT_MPS, SPEED_LIMIT_MPS)
 _VALID = (0.0, 1.0)
+_MOST_ACTORS = float(2**24)
 
 # (low, high) of each column, for the components that are tables
 _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
@@ -54,6 +57,11 @@ _COLUMNS: dict[str, tuple[tuple[int, ...], list[tuple[float, float]]]] = {
     "speed": ((), [_SPEED]),
     "speed_history": ((), [_SPEED] * SPEED_HISTORY),
     "imu": ((), [(-IMU_LIMIT, IMU_LIMIT)] * 6 + [(0.0, 2.0 * PI)]),
+    "contacts": (
+        (CONTACTS,),
+        [(0.0, _MOST_ACTORS), (0.0, float(max(ActorKind))), (-100.0, 100.0), (-100.0, 100.0)],
+    ),
+    "obstacle": ((), [(0.0, _MOST_ACTORS), (0.0, float(max(ActorKind))), (0.0, AHEAD_M)]),
     "odometry": ((), [(-ODOMETRY_LIMIT_M, ODOMETRY_LIMIT_M)] * 2 + [_YAW]),
 }
 
@@ -62,6 +70,7 @@ def observation_space(
     groups: tuple[str, ...],
     cameras: str | Rig = "small",
     lidar: str | LidarConfig = "paper",
+    radars: tuple[RadarConfig, ...] = FRONT_RADAR,
     *,
     half_sweeps: bool = False,
 ) -> spaces.Dict:
@@ -90,6 +99,11 @@ def observation_space(
     Group `lidar`: `lidar` (rays, 4) x, y, z in the ego's frame [m] and intensity of each ray's hit,
     zeros for rays that hit nothing or were dropped; and what else is asked for (see `LidarConfig`).
     With `half_sweeps` it has the rows of the half that the tick scanned (see `sensors/lidar.py`).
+
+    Group `radar`: for each radar (rays, 4) distance [m], azimuth to the right and elevation [rad]
+    in its own frame, speed away from it [m/s]; zeros for rays that met nothing.
+
+    Group `proximity`: `contacts`, `obstacle`, `across_line` (see `sensors/proximity.py`).
     """
     space: dict[str, spaces.Space[Any]] = {}
     if "prompt" in groups:
@@ -108,6 +122,11 @@ def observation_space(
         space.update(_image_spaces(rig_of(cameras)))
     if "lidar" in groups:
         space.update(_lidar_spaces(lidar_of(lidar), half_sweeps))
+    if "radar" in groups:
+        space.update({radar.name: _radar_space(radar) for radar in radars})
+    if "proximity" in groups:
+        space.update({name: _table(name) for name in ("contacts", "obstacle")})
+        space["across_line"] = spaces.MultiBinary(1)
     return spaces.Dict(space)
 
 
@@ -120,7 +139,21 @@ def _lidar_spaces(config: LidarConfig, half_sweeps: bool) -> dict[str, spaces.Sp
     points: dict[str, spaces.Space[Any]] = {"lidar": spaces.Box(low, high, dtype=np.float32)}
     if config.semantic:
         points["lidar_semantic"] = spaces.Box(0, max(Tag), (rays,), np.uint8)
+    if config.instance:
+        most = int(np.iinfo(np.int32).max)
+        points["lidar_instance"] = spaces.Box(0, most, (rays,), np.int32)
+        points["lidar_incidence"] = spaces.Box(0.0, 1.0, (rays,), np.float32)
     return points
+
+
+def _radar_space(config: RadarConfig) -> spaces.Box:
+    turn = PI / 2.0
+    high = np.tile(
+        np.array([config.range_m, turn, turn, 2.0 * SPEED_LIMIT_MPS], np.float32), (config.rays, 1)
+    )
+    low = -high
+    low[:, 0] = 0.0
+    return spaces.Box(low, high, dtype=np.float32)
 
 
 def _image_spaces(rig: Rig) -> dict[str, spaces.Space[Any]]:

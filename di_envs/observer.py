@@ -30,6 +30,9 @@ from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.inertial import fill_gnss, fill_imu
 from di_envs.sensors.lidar.config import LidarConfig, lidar_of
 from di_envs.sensors.lidar.sweep import Lidar
+from di_envs.sensors.proximity import proximity_of
+from di_envs.sensors.radar.config import FRONT_RADAR, RadarConfig
+from di_envs.sensors.radar.look import Radars
 from di_envs.sensors.route_weather import keyframes_of, weather_at
 from di_envs.sensors.weather import Weather, weather_of
 from di_envs.town.lanes import Lanes
@@ -94,6 +97,8 @@ class Observer:
         lidar: str | LidarConfig = "paper",
         half_sweeps: bool = False,
         weather: str | None = None,
+        radars: tuple[RadarConfig, ...] = FRONT_RADAR,
+        gnss_origin: tuple[float, float] | None = None,
     ) -> None:
         """Prepares to look.
 
@@ -106,18 +111,22 @@ class Observer:
             half_sweeps: It looks at every tick, so it sees half a turn of the LiDAR each time.
             weather: What cameras see, one of CARLA's presets, or `route` for what the route's file
                 says; None for ClearNoon.
+            radars: Its radars; for group `radar`.
+            gnss_origin: Latitude and longitude [deg] of x = y = 0; None for the town's.
         """
         self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
         self._with_odometry = "odometry" in groups
         self._rig = rig_of(cameras) if "camera" in groups else None
         self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
+        self._radar_configs = radars if "radar" in groups else ()
+        self._with_proximity = "proximity" in groups
         self._half_sweeps = half_sweeps
         self.weather = weather or "ClearNoon"
         self._ego, self._town = ego, town
         self._prompt: Prompt | None = None
         self._stop_lines = stop_lines_of(town.signals)
         self._chunks = build_map_chunks(town.lanes)
-        self._geo_origin = np.array(town.geo_origin, np.float64)
+        self._geo_origin = np.array(gnss_origin or town.geo_origin, np.float64)
 
     def of_ego(self, ego: int) -> Observer:
         """Another observer, of that ego: it shares the static tables, `start` makes its buffers."""
@@ -158,6 +167,10 @@ class Observer:
                 self._town, self._lidar_config, self._ego, half_sweeps=self._half_sweeps
             )
             self._lidar.start(view)
+        self._radars: Radars | None = None
+        if self._radar_configs:
+            self._radars = Radars(self._town, self._radar_configs, self._ego)
+            self._radars.start(view)
 
     def change_weather(self, weather: str) -> None:
         """What cameras see from now on; for much less than another `start`."""
@@ -219,6 +232,10 @@ class Observer:
             observation.update(self._cameras.observe())
         if self._lidar is not None:
             observation.update(self._lidar.observe())
+        if self._radars is not None:
+            observation.update(self._radars.observe())
+        if self._with_proximity:
+            observation.update(proximity_of(sight.state, sight.lanes, self._ego))
         return observation
 
 

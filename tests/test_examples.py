@@ -156,7 +156,7 @@ def test_a_leaderboard_agent_drives_the_same_with_carlas_wheel_and_without():
         for how in ("seen", "hidden")
     ]
     assert told[0][0] == told[1][0]
-    assert (told[0][1], told[1][1]) == ("carla.libcarla", "types")
+    assert (told[0][1], told[1][1]) == ("carla.libcarla", "agents.carla.values")
 
 
 @pytest.mark.parametrize(("leaderboard", "route"), [("1.0", "10"), ("2.1", "14")])

@@ -28,8 +28,8 @@ FLOORS = {
         {"", "drawing", "edits"},
     ),
     "agents": (
-        {"", "navigation"},
-        {"expert", "carla", "sb3", "explain", "networks"},
+        {""},
+        {"expert", "carla", "navigation", "sb3", "explain", "networks"},
         {"driveinsight"},
         {"training", "zoo"},
     ),
@@ -51,6 +51,7 @@ MODULES = sorted(path for package in ALLOWED for path in (TOP / package).rglob("
 ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za-z]:[\\/])")
 # Modules that ask the environment, and why they may
 ASKING = {
+    "agents/carla/importing.py": "agents for CARLA read what its scripts say by them",
     "di_envs/files/caches.py": "who runs a container says by one where caches may be written",
     "di_envs/numerics/kernels.py": "Numba is told by one, before it loads, to keep bits equal",
     "leaderboard/running/workers/ray_engine.py": "Ray is told by one to report nobody's usage",

@@ -6,7 +6,8 @@ for every route, in the order of the Leaderboard that it was written for:
 - 1.0: `Agent(config)`, which calls `setup(config)`; `sensors()`; `set_global_plan(gps, world)`.
 - 2.x: `Agent(host, port, debug)`; `set_global_plan(gps, world)`; `setup(config)`; `sensors()`.
 
-Then `run_step(input_data, timestamp)` every 0.05 s, and `destroy()` at the end. What an environment
+Then `run_step(input_data, timestamp)` every 0.05 s, and `destroy()` at the end. What is said behind
+the file's name is in `agents.carla.options`. What an environment
 must show follows from `sensors()`, so an agent is set up once more, without a route, before the
 first one.
 """
@@ -14,28 +15,24 @@ first one.
 from __future__ import annotations
 
 import inspect
-import sys
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from agents import AgentSpecError, module_of_file
 from agents.base import Control, Observation, Requirements, make_control
+from agents.carla import data_provider
+from agents.carla.events import EventMemory
 from agents.carla.formats import input_data
+from agents.carla.importing import entry_class
+from agents.carla.options import CarlaOptions, folders_of
 from agents.carla.plan import global_plan
 from agents.one_thread import one_thread
-from di_envs.config import check_name
-from di_envs.sensors.carla_suite import LEADERBOARDS, CarlaSuite, SensorSuiteError, suite_of
+from di_envs.sensors.carla_suite import CarlaSuite, SensorSuiteError, suite_of
 from di_envs.town.plan import RoutePlan
 
 TICK_S = 0.05  # the Leaderboard's; an agent decides at every tick
 HOST, PORT = "localhost", 2000  # CARLA's defaults, told to 2.x agents; nobody listens there
-_HINTS = {
-    "carla": "Install CARLA's wheel: pip install 'driveinsight[carla]'.",
-    "srunner": "CARLA's ScenarioRunner is not here: agents that ask the simulator for the truth "
-    "cannot be driven.",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +40,8 @@ class CarlaMemory:
     """What we remember for an agent that hides the rest: how often it has decided."""
 
     decisions: int = 0
-    origin_latitude: float
+    origin: tuple[float, float]  # latitude, longitude [deg] of x = y = 0, by which GNSS counts
+    events: EventMemory = field(default_factory=EventMemory)
 
 
 class CarlaAgent:
@@ -52,22 +50,40 @@ class CarlaAgent:
     Not `branchable`: what it remembers is its own affair, so it is branched by replaying.
 
     Args:
-        path: Its Python file, with `get_entry_point()`.
+        file: Its Python file, with `get_entry_point()`.
         config: Handed to its `setup`, unread; empty if there is none.
         leaderboard: `1.0`, `2.0` or `2.1`: which constructor it has, how sparse its route is and
             how many sensors it may have. None: 2.1 if its class has a constructor of its own that
             takes a host and a port, else 1.0.
+        origin: Where on Earth GNSS has x = y = 0: `map`, or `LAT,LON`. None: 0, 0 for an agent of
+            Leaderboard 1.0, what the map says for one of 2.x.
+        limits: `leaderboard` to refuse sensors that the Leaderboard refuses.
+        path: Folders, with commas between, from which the file's imports come first.
+        track: `PRIVILEGED` for one that asks `CarlaDataProvider` for the truth.
     """
 
-    def __init__(self, path: str, config: str = "", leaderboard: str | None = None) -> None:
-        if leaderboard is not None:
-            try:
-                check_name(leaderboard, LEADERBOARDS, "leaderboard")
-            except ValueError as error:
-                raise AgentSpecError(str(error)) from error
-        self._class = _entry_class(Path(path))
+    def __init__(
+        self,
+        file: str,
+        config: str = "",
+        leaderboard: str | None = None,
+        origin: str | None = None,
+        limits: str = "none",
+        path: str = "",
+        track: str | None = None,
+    ) -> None:
+        self._options = CarlaOptions(
+            config=config,
+            leaderboard=leaderboard,
+            origin=origin,
+            limits=limits,
+            path=folders_of(path),
+            track=track,
+        )
+        self._class = entry_class(Path(file), config, self._options.path)
         self._config = config
         self._leaderboard = leaderboard or _leaderboard_of(self._class)
+        self._origin = self._options.gnss_origin(self._leaderboard)
         self._requires: Requirements | None = None
         self._agent: Any = None
         self._suite: CarlaSuite | None = None
@@ -86,7 +102,7 @@ class CarlaAgent:
                     stacklevel=2,
                 )
                 suite = suite_of([])
-            self._requires = _requirements(suite)
+            self._requires = self._requirements(suite)
         return self._requires
 
     def start(self, plan: RoutePlan, seed: int) -> CarlaMemory:
@@ -96,9 +112,10 @@ class CarlaAgent:
             SensorSuiteError: If its `sensors()` are refused. What its own code raises goes on.
         """
         self.close()
+        data_provider.GameTime.show(0)
         self._agent, self._suite = self._built(plan)
-        self._requires = _requirements(self._suite)
-        return CarlaMemory(origin_latitude=plan.geo_origin[0])
+        self._requires = self._requirements(self._suite)
+        return CarlaMemory(origin=self._origin or plan.geo_origin)
 
     def act(self, observation: Observation, memory: CarlaMemory) -> tuple[Control, CarlaMemory]:
         """One `run_step`."""
@@ -106,21 +123,35 @@ class CarlaAgent:
             raise RuntimeError("there is no route to drive; call start(plan, seed) first")
         # CARLA counts a tick before it asks its agent, so the first one is at 0.05 s
         frame = memory.decisions + 1
-        data = input_data(self._suite, observation, frame, memory.origin_latitude)
+        data = input_data(self._suite, observation, frame, memory.origin, memory.events)
         self._agent.sensor_interface.deliver(data, frame * TICK_S)
+        data_provider.GameTime.show(frame)
+        data_provider.show(observation.get("world"))
         with one_thread():
             control = control_of(self._agent())
-        return control, CarlaMemory(decisions=frame, origin_latitude=memory.origin_latitude)
+        return control, replace(memory, decisions=frame, events=memory.events.after(observation))
 
     def close(self) -> None:
         """Lets it `destroy` what it holds."""
         agent, self._agent = self._agent, None
+        data_provider.show(None)
         if agent is not None:
             agent.destroy()
 
+    def _requirements(self, suite: CarlaSuite) -> Requirements:
+        counted = {} if self._origin is None else {"gnss_origin": self._origin}
+        return Requirements(
+            observations=suite.observations,
+            control_dt_s=TICK_S,
+            options={**suite.options, **(counted if "inertial" in suite.observations else {})},
+            hd_map=suite.with_map or suite.track.startswith("MAP"),
+            privileged=self._options.track == "PRIVILEGED",
+            branchable=False,
+        )
+
     def _built(self, plan: RoutePlan | None) -> tuple[Any, CarlaSuite]:
         """A fresh agent and its sensors; without a plan it is told none."""
-        routes = None if plan is None else global_plan(plan)
+        routes = None if plan is None else global_plan(plan, self._origin)
         if self._leaderboard == "1.0":
             agent = self._class(self._config)
         else:
@@ -134,7 +165,7 @@ class CarlaAgent:
             if routes is not None:
                 agent.set_global_plan(*routes)
             agent.setup(self._config)
-        suite = _suite_of_agent(agent, self._leaderboard)
+        suite = _suite_of_agent(agent, self._leaderboard, self._options.limits)
         if self._leaderboard == "1.0" and routes is not None:
             agent.set_global_plan(*routes)
         return agent, suite
@@ -166,7 +197,7 @@ def control_of(given: Any) -> Control:
     return make_control(throttle, steer, brake)
 
 
-def _suite_of_agent(agent: Any, leaderboard: str) -> CarlaSuite:
+def _suite_of_agent(agent: Any, leaderboard: str, limits: str) -> CarlaSuite:
     """What its `sensors()` ask for, on the track that it says."""
     track = getattr(agent, "track", "SENSORS")
     name = str(getattr(track, "value", track))
@@ -174,43 +205,7 @@ def _suite_of_agent(agent: Any, leaderboard: str) -> CarlaSuite:
         sensors = agent.sensors()
     except (Exception, SystemExit) as error:
         raise SensorSuiteError(f"sensors() raised {type(error).__name__}: {error}") from error
-    return suite_of(sensors, name, leaderboard)
-
-
-def _requirements(suite: CarlaSuite) -> Requirements:
-    return Requirements(
-        observations=suite.observations,
-        control_dt_s=TICK_S,
-        options=suite.options,
-        hd_map=suite.with_map or suite.track.startswith("MAP"),
-        branchable=False,
-    )
-
-
-def _entry_class(path: Path) -> type[Any]:
-    """The class that an agent's file names as its entry point."""
-    spec = f"carla:{path}"
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)  # as CARLA's evaluator does: agents import what lies beside them
-    try:
-        module = module_of_file(spec, path)
-    except ModuleNotFoundError as error:
-        hint = _HINTS.get(str(error.name).partition(".")[0], "Is it installed, or on PYTHONPATH?")
-        raise AgentSpecError(f"agent '{spec}' imports what is not here: {error}. {hint}") from error
-    named = getattr(module, "get_entry_point", None)
-    if not callable(named):
-        raise AgentSpecError(
-            f"agent '{spec}': the file has no get_entry_point(), which returns the name of the "
-            f"agent's class; for one that is written for DriveInsight give {path}:Class."
-        )
-    name = named()
-    found = getattr(module, str(name), None)
-    if not isinstance(found, type):
-        raise AgentSpecError(
-            f"agent '{spec}': get_entry_point() returned {name!r}, which is no class of the file."
-        )
-    return found
+    return suite_of(sensors, name, leaderboard, limits)
 
 
 def _leaderboard_of(agent: type[Any]) -> str:

@@ -18,8 +18,14 @@ GpsPlan = list[tuple[dict[str, float], RoadOption]]
 WorldPlan = list[tuple[Any, RoadOption]]
 
 
-def global_plan(plan: RoutePlan) -> tuple[GpsPlan, WorldPlan]:
+def global_plan(
+    plan: RoutePlan, origin: tuple[float, float] | None = None
+) -> tuple[GpsPlan, WorldPlan]:
     """The dense route twice, point by point alike.
+
+    Args:
+        plan: The route.
+        origin: Latitude and longitude [deg] of x = y = 0; None for what the town's map says.
 
     Returns:
         Dicts of `lat` [deg], `lon` [deg] and `z` [m], each with its option; and `carla.Transform`s
@@ -30,7 +36,7 @@ def global_plan(plan: RoutePlan) -> tuple[GpsPlan, WorldPlan]:
     world: WorldPlan = []
     for (x, y, z, yaw), value in zip(plan.points.tolist(), plan.option.tolist(), strict=True):
         option = RoadOption(value)
-        latitude, longitude = geodetic(x, y, *plan.geo_origin)
+        latitude, longitude = geodetic(x, y, *(origin or plan.geo_origin))
         gps.append(({"lat": latitude, "lon": longitude, "z": z}, option))
         place = carla.Location(x=x, y=y, z=z)
         rotation = carla.Rotation(pitch=0.0, yaw=math.degrees(yaw), roll=0.0)

@@ -1,1 +1,1 @@
-"""What agents for CARLA import from its `agents.navigation`: the names of road options."""
+"""What agents for CARLA import from its `agents.navigation`: road options, planners, drivers."""

@@ -43,6 +43,7 @@ class Stream(IntEnum):
     STEER_NOISE = 19
     THROTTLE_NOISE = 20
     TRAFFIC_RETURN = 21  # where a vehicle that has left by an open end comes back
+    RADAR = 22  # where in its cone each ray of a radar goes
 
 
 @kernel

@@ -8,10 +8,12 @@ licence); our own code.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any
 
+from agents.carla.data_provider import CarlaDataProvider, NoTruthError
 from leaderboard.envs.sensor_interface import SensorInterface
 from leaderboard.utils.route_manipulation import downsample_route
 
@@ -33,6 +35,7 @@ class AutonomousAgent:
     Attributes:
         track: One of `Track`.
         sensor_interface: Where the sensors' data arrive.
+        hero_actor: None; agents of some forks keep the ego there.
     """
 
     def __init__(self, *given: Any, **named: Any) -> None:
@@ -47,6 +50,7 @@ class AutonomousAgent:
         self._target_spacing_m = TARGET_SPACING_M["1.0" if is_first else "2.x"]
         self.sensor_interface = SensorInterface()
         self.wallclock_t0 = None
+        self.hero_actor: Any = None
         if is_first:
             self.setup(*given, **named)
 
@@ -84,6 +88,35 @@ class AutonomousAgent:
         kept = downsample_route(global_plan_world_coord, self._target_spacing_m)
         self._global_plan = [global_plan_gps[index] for index in kept]
         self._global_plan_world_coord = [global_plan_world_coord[index] for index in kept]
+
+    def get_metric_info(self) -> dict[str, list[float]]:
+        """What Bench2Drive's agents note at each step for its metrics: truths about the ego.
+
+        Returns:
+            `acceleration`, `angular_velocity`, `forward_vector`, `right_vector`, `location` (x, y,
+            z) and `rotation` (roll, pitch, yaw), in CARLA's units; NaN but for privileged agents.
+        """
+        names = ("acceleration", "angular_velocity", "forward_vector", "right_vector", "location")
+        try:
+            hero = CarlaDataProvider.get_hero_actor()
+        except NoTruthError:
+            return {name: [math.nan] * 3 for name in (*names, "rotation")}
+        place = hero.get_transform()
+        found = (
+            hero.get_acceleration(),
+            hero.get_angular_velocity(),
+            place.get_forward_vector(),
+            place.get_right_vector(),
+            place.location,
+        )
+        told = {name: [v.x, v.y, v.z] for name, v in zip(names, found, strict=True)}
+        turn = place.rotation
+        return {**told, "rotation": [turn.roll, turn.pitch, turn.yaw]}
+
+    @staticmethod
+    def get_ros_version() -> int:
+        """-1: it is no node of ROS."""
+        return -1
 
     def __call__(self) -> Any:
         """One `run_step` on the data that have arrived."""

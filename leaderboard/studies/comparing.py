@@ -18,7 +18,9 @@ from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
 from leaderboard.statistics.bootstrap import BootstrapInterval, clustered_interval
 
 # Options of the environment that change what an agent sees or how often it decides, not the world
-_SEEN_ONLY = frozenset({"observations", "cameras", "lidar", "weather", "control_dt_s"})
+_SEEN_ONLY = frozenset(
+    {"observations", "cameras", "lidar", "radars", "gnss_origin", "weather", "control_dt_s"}
+)
 _CHOICE = frozenset({"route_ids", "rules"})  # which routes, and what their events cost
 SCORES = ("driving_score", "route_completion", "infraction_score")
 

@@ -23,6 +23,7 @@ def test_agents_of_the_table_and_policies_run_no_code_of_others(spec):
         ("mine.py:Mine", "the file /"),
         ("carla:team/agent.py?config=a.yaml", "team/agent.py"),
         ("carla:agent.py?no such option", "agent.py"),
+        ("carla:agent.py?path=repo,repo/leaderboard&limits=none", "/repo/leaderboard"),
         ("sb3:ppo.zip?control_dt_s=0.2", "the pickles in "),
         ("my.package:Mine", "the module my.package"),
         ("agents.expert.agent:Path", "the module agents.expert.agent (/"),

@@ -7,11 +7,10 @@ changed: sizes; the narrow camera ahead stands among the student's channels.
 
 from __future__ import annotations
 
-from typing import Self
-
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+from typing_extensions import Self
 
 from agents.driveinsight.rows import METRES
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup

@@ -9,7 +9,7 @@ import numpy as np
 
 from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt32
 from di_envs.numerics.bundles import by_reference
-from di_envs.sensors.camera.config import CameraConfig, Rig
+from di_envs.sensors.camera.config import STEEP_RAD, CameraConfig, Rig
 from di_envs.sensors.camera.projection import Camera, Projected
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.scene.scene import Scene
@@ -90,7 +90,7 @@ def _camera_of(config: CameraConfig) -> Camera:
         focal_px=float(config.focal_px),
         cx_px=config.width / 2.0,
         cy_px=config.height / 2.0,
-        beam=max(0.0, math.cos(config.yaw_rad)),
+        beam=max(0.0, math.cos(config.yaw_rad)) if abs(config.pitch_rad) <= STEEP_RAD else 0.0,
         eye=np.zeros(3),
         axes=axes,
         ahead=axes[0],

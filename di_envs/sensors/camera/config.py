@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from di_envs.files.names import name_hint
 
 LARGEST_PX = 8192
-STEEPEST_RAD = math.radians(60.0)
+STEEP_RAD = math.radians(60.0)  # steeper ones look down or up more than ahead
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class CameraConfig:
         y_m: … to the right.
         z_m: … above the ground.
         yaw_rad: Turned to the right.
-        pitch_rad: Lifted; at most 60 degrees either way. There is no roll.
+        pitch_rad: Lifted; at most 90 degrees either way. There is no roll.
     """
 
     name: str
@@ -69,9 +69,9 @@ class CameraConfig:
                 f"excluded, as a flat image has no other; got {self.fov_deg!r}. Use several "
                 f"cameras to see all round; the paper's have 150."
             )
-        if not abs(self.pitch_rad) <= STEEPEST_RAD:
+        if not abs(self.pitch_rad) <= math.pi / 2.0:
             raise ValueError(
-                f"Camera '{self.name}' may be pitched by at most 60 degrees (1.047 rad) either "
+                f"Camera '{self.name}' may be pitched by at most 90 degrees (1.571 rad) either "
                 f"way; got {self.pitch_rad!r} rad. Is it in degrees?"
             )
         for place in ("x_m", "y_m", "z_m", "yaw_rad"):

@@ -12,6 +12,7 @@ import numpy as np
 from di_envs.numerics.arrays import Float64, UInt8
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.camera.canvas import Canvas, Studio
+from di_envs.sensors.camera.config import STEEP_RAD
 from di_envs.sensors.camera.raster_spans import (
     add_colours,
     fetch,
@@ -106,7 +107,7 @@ def colour_by_raster(
     x0, y0 = cam.eye[0] - raster.origin[0], cam.eye[1] - raster.origin[1]
     start, width, height = raster.start[level], raster.width[level], raster.height[level]
     for tap in range(taps):
-        shift = ((tap + 0.5) / taps - 0.5) * long / flat_m
+        shift = ((tap + 0.5) / taps - 0.5) * long / max(flat_m, 1e-9)
         axis = _axis(x0 + shift * gx, gx + u0 * right[0], right[0] / focal)
         plane_points(u, depth, stride, axis, F(a))
         axis = _axis(y0 + shift * gy, gy + u0 * right[1], right[1] / focal)
@@ -164,6 +165,9 @@ def shade_row(studio: Studio, canvas: Canvas, v: float, far: float) -> None:
     flat_m = far * math.hypot(ahead[0] + v * down[0], ahead[1] + v * down[1])
     above = max(0.1, cam.eye[2] - studio.scene.base_z[0])
     long = far / focal * max(1.0, flat_m / above)  # of a pixel, along the road
+    back = ahead[0] * (ahead[0] + v * down[0]) + ahead[1] * (ahead[1] + v * down[1]) < 0.0
+    if back and abs(cam.pitch_rad) > STEEP_RAD:
+        flat_m = -flat_m  # what lies behind the camera's foot
     for k in range(seen.count[1]):
         least_m, most_m, wide_m = seen.shadow_m[k, 0], seen.shadow_m[k, 1], seen.shadow_m[k, 2]
         if flat_m < least_m or flat_m > most_m:

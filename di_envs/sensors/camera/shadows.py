@@ -12,6 +12,7 @@ import numpy as np
 
 from di_envs.numerics.arrays import Float64
 from di_envs.numerics.kernels import kernel
+from di_envs.sensors.camera.config import STEEP_RAD
 from di_envs.sensors.camera.projection import NEAR, Camera, Projected
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.weather import WeatherLook
@@ -45,7 +46,7 @@ def project_shadows(
             continue
         at = out.count[1]
         _shadow(cam, boxes, b, bottom, top, fall, out.strips[at], out.shadow_m[at])
-        if out.shadow_m[at, 1] > NEAR:
+        if out.shadow_m[at, 1] > NEAR or abs(cam.pitch_rad) > STEEP_RAD:
             out.count[1] += 1
 
 

@@ -44,6 +44,9 @@ class LidarConfig:
             linearly to 0 at `dropoff_intensity`.
         noise_m: Standard deviation of a hit's distance.
         semantic: Add `lidar_semantic`: (rays,) uint8, `Tag`, NONE for rays without a hit.
+        instance: Add `lidar_instance`: (rays,) int32, actor id + 1 of what was hit, 0 for what is
+            no actor; and `lidar_incidence`: (rays,) float32, cosine of the angle between the ray
+            and what it hit, 0 for rays without a hit.
     """
 
     channels: int = 32
@@ -60,6 +63,7 @@ class LidarConfig:
     dropoff_zero: float = 0.4
     noise_m: float = 0.0
     semantic: bool = False
+    instance: bool = False
 
     def __post_init__(self) -> None:
         for side, least in (("channels", 2), ("steps", 4)):

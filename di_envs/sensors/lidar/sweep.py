@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from di_envs.numerics.arrays import Float32, UInt8
 from di_envs.numerics.kernels import bind, kernel
 from di_envs.sensors.lidar.config import LidarConfig
+from di_envs.sensors.lidar.hits import hits_of
 from di_envs.sensors.lidar.points import write_points, write_tags
 from di_envs.sensors.lidar.rays import Sweep, meet_boxes, meet_ground
 from di_envs.sensors.lidar.window import LidarPose
@@ -95,6 +96,8 @@ class Lidar:
         found: dict[str, NDArray[Any]] = {"lidar": points.reshape(rays, 4)}
         if self.config.semantic:
             found["lidar_semantic"] = tags.reshape(rays)
+        if self.config.instance:
+            found |= hits_of(sweep, self._ego, points.reshape(rays, 4))
         return found
 
     def _images(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:

@@ -48,6 +48,7 @@ _SENSORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "camera": ("carla_camera",) * 4,
         "lidar": ("carla_lidar",),
+        "radar": ("carla_radar",),
         "inertial": ("carla_gnss", "carla_imu", "carla_speedometer"),
     }
 )

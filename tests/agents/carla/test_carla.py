@@ -13,8 +13,9 @@ import pytest
 from rich.console import Console
 
 from agents import AgentSpecError, load_agent
-from agents.base import Track
+from agents.base import Requirements, Track
 from agents.carla.agent import control_of
+from agents.carla.formats import with_origin
 from di_envs.route_env import RouteEnv
 from di_envs.suites import load_suite
 from leaderboard.records.record import AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID
@@ -159,7 +160,8 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
         town = driver.env.view.town
         calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
-    assert calls[-2] == town.opendrive  # the last call is destroy()
+    assert calls[-2] == with_origin(town.opendrive, (0.0, 0.0))  # the last call is destroy()
+    assert "lat_0=0.0" in calls[-2]
     with Driver(apart) as driver:
         again = driver.drive(Job(index=0, route_id="1", seed=0))
     assert again.fingerprint() == record.fingerprint()
@@ -256,7 +258,8 @@ def test_carlas_own_controls_are_taken():
     ("text", "says"),
     [
         ("import carla_without_end", "imports what is not here: No module named 'carla_without"),
-        ("import srunner", "ScenarioRunner is not here"),
+        ("import srunner.scenarios.basic_scenario", "Of CARLA's ScenarioRunner there is scenariom"),
+        ("import leaderboard.utils.checkpoint_tools", "Of CARLA's Leaderboard there is autoagents"),
         ("class Mine: pass", r"no get_entry_point\(\)"),
         ("def get_entry_point(): return 'Mine'", "returned 'Mine', which is no class"),
     ],
@@ -274,6 +277,9 @@ def test_a_file_that_is_no_agent_says_what_is_missing(text, says, tmp_path):
         ("?leaderbord=2.1", "no option 'leaderbord'; did you mean 'leaderboard'"),
         ("?leaderboard=3", r"Unknown leaderboard '3'; .*known: 1\.0, 2\.0, 2\.1"),
         ("?config", "expected option=value"),
+        ("?file=other.py", "the file stands before the '.', not behind it"),
+        ("?origin=here", "A map's origin is its latitude"),
+        ("?limits=strict", "Unknown limits 'strict'"),
     ],
 )
 def test_a_wrong_option_is_refused(query, says, tmp_path):
@@ -298,6 +304,22 @@ def test_an_agent_imports_what_lies_beside_its_file(tmp_path):
     assert agent._class.THROTTLE == 0.25
 
 
+def test_folders_of_the_path_come_first_for_the_agents_imports_and_ours_before_them(tmp_path):
+    """A published repository brings `leaderboard` and `team_code`; ours of the one is kept."""
+    repo = tmp_path / "repo"
+    for folder in (repo / "leaderboard" / "leaderboard", repo / "leaderboard" / "team_code"):
+        folder.mkdir(parents=True)
+    (repo / "leaderboard" / "leaderboard" / "__init__.py").write_text("raise OSError('theirs')\n")
+    (repo / "leaderboard" / "team_code" / "planner_of_theirs.py").write_text("THROTTLE = 0.5\n")
+    own = """
+    from team_code.planner_of_theirs import THROTTLE
+    """
+    spec = written(tmp_path, own) + f"?path={repo},{repo}/leaderboard"
+    assert load_agent(spec)._class.THROTTLE == 0.5
+    with pytest.raises(AgentSpecError, match=r"path: there is no folder .*nowhere"):
+        load_agent(written(tmp_path) + "?path=nowhere")
+
+
 def test_a_run_records_the_agents_own_sensors(tmp_path):
     """A rig is no JSON; the files name its cameras all the same."""
     own = "def run_step(self, data, timestamp):\n    return None"
@@ -310,3 +332,54 @@ def test_a_run_records_the_agents_own_sensors(tmp_path):
     assert run.requires["control_dt_s"] == 0.05
     assert run.requires["options"]["cameras"]["cameras"][0]["name"] == "camera_eye"
     assert json.dumps(run.requires["options"])
+
+
+GPS_BODY = """
+    def run_step(self, input_data, timestamp):
+        self.CALLS.append((input_data["gps"][1], [gps for gps, _ in self._global_plan]))
+        return SimpleNamespace(throttle=0.0, steer=0.0, brake=1.0)
+"""
+CONSTANTS = np.array([111324.60662786, 111319.490945])  # metres a degree, of agents for 0.9.10
+
+
+@pytest.mark.parametrize(
+    ("query", "exact"), [("", True), ("?origin=0,0", True), ("?origin=49,8", False)]
+)
+def test_the_constants_of_agents_for_0_9_10_give_the_next_target_to_a_decimetre(
+    query, exact, tmp_path
+):
+    """North and east of 0, 0 as their planners count them; from 49, 8 they would be wrong."""
+    spec = written(tmp_path, GPS_BODY) + query
+    agent = load_agent(spec)
+    env = RouteEnv(**environment_options(QUIET, agent.requires))
+    observation, _ = env.reset(seed=1)
+    agent.act(observation, agent.start(env.plan, 1))
+    ((gps, targets),) = [call for call in agent._class.CALLS if isinstance(call[1], list)]
+    agent._class.CALLS.clear()
+    place = np.array([targets[1]["lat"], targets[1]["lon"]])
+    north, east = (place - gps[:2]) * CONSTANTS
+    x, y = env.plan.points[env.plan.targets[1], :2] - [env.view.state.x[0], env.view.state.y[0]]
+    noise_m = 2.0  # of GNSS, four times
+    assert (abs(east - x) < noise_m and abs(north + y) < noise_m) == exact
+    if exact:
+        first = np.array([targets[0]["lat"], targets[0]["lon"]])
+        north, east = (place - first) * CONSTANTS
+        x, y = env.plan.points[env.plan.targets[1], :2] - env.plan.points[env.plan.targets[0], :2]
+        assert (east, north) == (pytest.approx(x, abs=0.1), pytest.approx(-y, abs=0.1))
+
+
+def test_agents_of_leaderboard_two_count_from_the_maps_origin(tmp_path):
+    assert "gnss_origin" not in load_agent(written(tmp_path) + "?leaderboard=2.1").requires.options
+    asked = load_agent(written(tmp_path) + "?leaderboard=2.1&origin=49,8").requires
+    assert asked.options["gnss_origin"] == (49.0, 8.0)
+    assert Requirements.of_json(json.loads(json.dumps(asked.as_json()))).options == asked.options
+
+
+def test_the_limits_of_the_leaderboard_hold_on_request(tmp_path):
+    own = """
+    def sensors(self):
+        return [{"type": "sensor.other.gnss", "id": "gps", "x": 25.0, "y": 0.0, "z": 0.0}]
+    """
+    assert load_agent(written(tmp_path, own)).requires.observations == ("inertial",)
+    with pytest.warns(UserWarning, match="25.00 m .* the Leaderboard allows 3 m"):
+        load_agent(written(tmp_path, own) + "?limits=leaderboard").requires  # noqa: B018

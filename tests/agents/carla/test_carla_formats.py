@@ -9,15 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import floats
 
-from agents.carla.formats import bgra, gnss_at, imu_turned, input_data, lidar_points
+from agents.carla.formats import gnss_at, imu_turned, input_data, lidar_points
+from agents.carla.images import bgra
 from agents.carla.plan import moved
-from di_envs.observer import Observer
-from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError, SensorType, suite_of
+from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError, suite_of
+from di_envs.sensors.carla_types import SensorType
 from di_envs.sensors.inertial import EARTH_RADIUS_M, geodetic
-from di_envs.suites import load_suite
-from di_envs.town.loading import load_town
-from di_envs.world.state import ActorKind, views_of
-from di_envs.world.world import World, WorldConfig
+from tests.agents.carla.scenes import Scene
 
 LEVEL = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}
 AT_ROOF = {"x": 0.0, "y": 0.0, "z": 1.5, **LEVEL}
@@ -39,41 +37,17 @@ def lidar_at(**mounting):
     return CarlaSensor(id="lidar", type=SensorType.LIDAR, **mounting)
 
 
-def put(world, actor, x, y, yaw=0.0, **fields):
-    """Places an actor, metres and radians."""
-    snapshot = world.save()
-    state = views_of(snapshot.record)
-    for name, value in {"x": x, "y": y, "z": 0.0, "yaw": yaw, **fields}.items():
-        getattr(state, name)[actor] = value
-    world.restore(snapshot)
-
-
-class Scene:
-    """An ego far outside the town at (600, 600), facing east, and one car."""
-
-    def __init__(self):
-        suite = load_suite("town05_short")
-        self.town = load_town(suite.town_path, suite.signals)
-        self.world = World(self.town, WorldConfig(vehicles=1, walkers=0))
-        self.world.reset(0, suite.plans(self.town, ["10"]))
-        put(self.world, 0, 600.0, 600.0, speed=3.0)
-
-    def seen(self, x, y, *, kind=ActorKind.CAR, **fields):
-        """What SUITE says with the car so far ahead and to the right of the ego."""
-        put(self.world, 1, 600.0 + x, 600.0 + y, kind=int(kind), **fields)
-        observer = Observer(self.town, SUITE.observations, **SUITE.options)
-        observer.start(self.world.view)
-        observation = {**observer.observe(), "town": self.town}
-        return observation, input_data(SUITE, observation, 7, self.town.geo_origin[0])
-
-
 @pytest.fixture(scope="module")
 def scene():
     return Scene()
 
 
+def seen(scene, x, y, **fields):
+    return scene.seen(SUITE, x, y, **fields)
+
+
 def test_every_sensor_has_its_shape_and_type(scene):
-    _, data = scene.seen(10.0, 0.0)
+    _, data = seen(scene, 10.0, 0.0)
     assert {frame for frame, _ in data.values()} == {7}
     assert list(data) == ["rgb", "lidar", "gps", "imu", "speed", "map"]
     values = {name: value for name, (_, value) in data.items()}
@@ -82,13 +56,13 @@ def test_every_sensor_has_its_shape_and_type(scene):
     assert values["lidar"].dtype == np.float32
     assert (values["gps"].shape, values["gps"].dtype) == ((3,), np.float64)
     assert (values["imu"].shape, values["imu"].dtype) == ((7,), np.float64)
-    assert values["speed"] == {"speed": 3.0}
+    assert values["speed"] == {"speed": 3.0, "spd": 3.0}
     assert values["map"] == {"opendrive": scene.town.opendrive}
 
 
 def test_a_red_box_ahead_is_red_in_channel_two(scene):
     """Brake lights of a car ahead that looks away: red, so channel 2 of blue, green, red, alpha."""
-    observation, data = scene.seen(8.0, 0.0, brake_light=1)
+    observation, data = seen(scene, 8.0, 0.0, brake_light=1)
     image = data["rgb"][1]
     assert (image[..., 3] == 255).all()
     np.testing.assert_array_equal(image[..., 2::-1], observation["camera_rgb"])
@@ -96,7 +70,7 @@ def test_a_red_box_ahead_is_red_in_channel_two(scene):
     lit = (below[..., 2] > 150) & (below[..., 0] < 90) & (below[..., 1] < 90)
     assert lit.sum() > 20
     assert abs(np.nonzero(lit)[1].mean() - 100.0) < 3.0  # one on either side of the middle
-    _, dark = scene.seen(8.0, 0.0, brake_light=0)
+    _, dark = seen(scene, 8.0, 0.0, brake_light=0)
     assert dark["rgb"][1][51:][lit].astype(int)[:, 2].mean() < below[lit][:, 2].mean() - 40.0
 
 
@@ -106,7 +80,7 @@ def test_blue_comes_first():
 
 
 def test_a_box_on_the_right_has_positive_y_in_the_lidar(scene):
-    _, data = scene.seen(0.0, 10.0)
+    _, data = seen(scene, 0.0, 10.0)
     points = data["lidar"][1]
     solid = points[points[:, 2] > -1.2]  # above the ground, which is 1.5 m below the sensor
     assert len(solid) > 50
@@ -115,7 +89,7 @@ def test_a_box_on_the_right_has_positive_y_in_the_lidar(scene):
 
 
 def test_a_box_ahead_has_positive_x_and_its_height_is_up(scene):
-    _, data = scene.seen(12.0, 0.0)
+    _, data = seen(scene, 12.0, 0.0)
     points = data["lidar"][1]
     solid = points[points[:, 2] > -1.2]
     assert (solid[:, 0] > 9.0).all()
@@ -141,7 +115,7 @@ def test_points_are_told_along_the_axes_of_a_turned_lidar(yaw_deg, ahead, right)
 
 
 def test_the_compass_counts_clockwise_from_north_and_east_is_a_quarter(scene):
-    _, data = scene.seen(10.0, 0.0)
+    _, data = seen(scene, 10.0, 0.0)
     assert data["imu"][1][6] == pytest.approx(math.pi / 2.0, abs=1e-6)  # the ego faces east
     assert data["imu"][1][2] == pytest.approx(9.81, abs=0.1)
 
@@ -177,4 +151,4 @@ def test_gnss_is_read_where_it_is_mounted(yaw, east_m, north_m):
 
 def test_an_environment_made_for_other_sensors_is_refused():
     with pytest.raises(SensorSuiteError, match=r"'rgb'.*made without 'camera_rgb'"):
-        input_data(SUITE, {}, 1, 0.0)
+        input_data(SUITE, {}, 1, (0.0, 0.0))

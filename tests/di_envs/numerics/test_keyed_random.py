@@ -95,4 +95,5 @@ def test_numbers_of_streams_are_part_of_every_seed_and_stay():
         "STEER_NOISE": 19,
         "THROTTLE_NOISE": 20,
         "TRAFFIC_RETURN": 21,
+        "RADAR": 22,
     }

@@ -97,6 +97,13 @@ def test_a_pitched_camera_sees_the_ground_where_geometry_says(empty):
     assert depth[100, 100] == pytest.approx(4.0, rel=1e-3)
 
 
+def test_a_camera_that_looks_straight_down_sees_level_ground_at_one_depth(empty):
+    """From 20 m: 20 m to every pixel, whichever way its row looks."""
+    place(empty, 0, 600.0, 600.0)
+    depth = images(empty, full(height=201, x_m=0.0, z_m=20.0, pitch_rad=-math.pi / 2.0))
+    np.testing.assert_allclose(depth["camera_front_depth"], 20.0, atol=1e-3)
+
+
 @pytest.mark.parametrize("yaw_deg", [0.0, 37.0, -90.0, 180.0])
 def test_project_agrees_with_the_image(empty, yaw_deg):
     """A motorcycle is found where `CameraConfig.project` says that its middle is."""

@@ -31,6 +31,14 @@ def imu(id_="imu", **changes):
     return {"type": "sensor.other.imu", "id": id_, **PLACE, **LEVEL, **changes}
 
 
+def radar(id_="radar", **changes):
+    return {"type": "sensor.other.radar", "id": id_, **PLACE, **LEVEL, "fov": 30, **changes}
+
+
+def strict(sensors, track="SENSORS", leaderboard="1.0"):
+    return suite_of(sensors, track, leaderboard, "leaderboard")
+
+
 SPEEDOMETER = {"type": "sensor.speedometer", "id": "speed", "reading_frequency": 20}
 MAP = {"type": "sensor.opendrive_map", "id": "map", "reading_frequency": 1}
 
@@ -76,28 +84,64 @@ def test_keys_that_carla_does_not_read_are_ignored_here_too():
 
 def test_each_leaderboard_and_track_has_its_limits():
     eight = [camera(f"c{k}") for k in range(8)]
-    assert len(suite_of(eight, "SENSORS", "2.1").sensors) == 8
-    assert len(suite_of(eight[:4]).sensors) == 4
+    assert len(strict(eight, "SENSORS", "2.1").sensors) == 8
+    assert len(strict(eight[:4]).sensors) == 4
     for track, leaderboard in (("SENSORS", "1.0"), ("SENSORS_QUALIFIER", "2.0")):
         with pytest.raises(SensorSuiteError, match=r"Too many .*camera.*: 5.* allows 4"):
-            suite_of(eight[:5], track, leaderboard)
+            strict(eight[:5], track, leaderboard)
     with pytest.raises(SensorSuiteError, match="allows 8"):
-        suite_of([*eight, camera("c8")], "SENSORS", "2.0")
+        strict([*eight, camera("c8")], "SENSORS", "2.0")
     with pytest.raises(SensorSuiteError, match=r"gnss: 2; .* allows 1"):
-        suite_of([gnss("a"), gnss("b")])
+        strict([gnss("a"), gnss("b")])
+    with pytest.raises(SensorSuiteError, match=r"3\.46 m .* the Leaderboard allows 3 m"):
+        strict([camera(x=2.0, y=2.0, z=2.0)])
+    with pytest.raises(SensorSuiteError, match=r"other\.collision: 1; .* allows 0"):
+        strict([{"type": "sensor.other.collision", "id": "bump"}])
+
+
+def test_without_the_leaderboards_limits_a_suite_may_have_more_and_reach_further():
+    assert len(suite_of([camera(f"c{k}") for k in range(9)]).sensors) == 9
+    above = suite_of([camera("bev", x=0.0, y=0.0, z=50.0, pitch=-90.0), camera("b2", pitch=270)])
+    assert [math.degrees(c.pitch_rad) for c in above.options["cameras"].cameras] == [-90.0, -90.0]
+    radars = suite_of([radar("a"), radar("b", yaw=180.0)])
+    assert radars.observations == ("radar",)
+    assert [config.name for config in radars.options["radars"]] == ["radar_a", "radar_b"]
+    assert radars.options["radars"][0].rays == 75  # 1500 a second at 20 Hz
+    events = suite_of([{"type": "sensor.other.collision", "id": "bump"}])
+    assert (events.observations, events.options) == (("proximity",), {})
 
 
 def test_the_map_is_for_the_track_of_that_name():
-    assert suite_of([MAP], "MAP").with_map
+    assert suite_of([MAP], "SENSORS").with_map
+    assert strict([MAP], "MAP").with_map
     with pytest.raises(SensorSuiteError, match=r"track MAP; this one's is SENSORS.*setup"):
-        suite_of([MAP], "SENSORS")
+        strict([MAP], "SENSORS")
+
+
+@pytest.mark.parametrize(
+    ("sensors", "says"),
+    [
+        ([camera(roll=10.0)], r"'front' \(roll of a sensor\.camera\.rgb is not simulated\)"),
+        ([lidar(pitch=-5.0)], r"'lidar' \(pitch"),
+        ([lidar(z=50.0)], r"'lidar' \(.*more than 20 m away"),
+        ([imu(roll=1.0)], r"'imu' \(roll"),
+        ([lidar(), lidar("second")], r"'second' \(this world carries 1 LiDAR\)"),
+        ([{"type": "sensor.camera.dvs", "id": "dvs"}], r"'dvs' \(sensor\.camera\.dvs is not"),
+        ([camera(roll=10.0), imu(roll=1.0)], r"'front' .*, 'imu' .*\.$"),
+    ],
+)
+def test_what_is_not_simulated_gives_empty_data_with_one_warning(sensors, says):
+    with pytest.warns(UserWarning, match=f"give empty data: {says}") as met:
+        suite = suite_of(sensors)
+    assert len(met) == 1
+    assert any(sensor.empty for sensor in suite.sensors)
 
 
 @pytest.mark.parametrize(
     ("sensors", "says"),
     [
         ([camera(), camera()], "'front' is given 2 times"),
-        ([camera(x=2.0, y=2.0, z=2.0)], "3.46 m from the ego's origin; the Leaderboard allows 3 m"),
+        ([camera(z=1000.5)], "1000.50 m from the ego's origin; at most 1000 m"),
         ([{**camera(), "type": "sensor.camera.rbg"}], r"did you mean 'sensor\.camera\.rgb'"),
         ([{**camera(), "type": ["sensor.camera.rgb"]}], "unknown type"),
         ([{"type": "sensor.camera.rgb"}], "needs an 'id'"),
@@ -111,20 +155,13 @@ def test_the_map_is_for_the_track_of_that_name():
         ([camera(width=300.5)], "'front'.*width is a number of pixels; got 300.5"),
         ([camera(x=math.nan)], "x must be a number; got nan"),
         ([camera(yaw="east")], "yaw must be a number; got 'east'"),
-        ([camera(roll=10.0)], "'front'.*roll is not simulated"),
-        ([lidar(pitch=-5.0)], "'lidar'.*pitch is not simulated"),
-        ([imu(roll=1.0)], "'imu'.*roll is not simulated"),
-        ([{**lidar(), "type": "sensor.other.radar", "fov": 30}], "radars are not simulated"),
+        ([radar(fov=180.0)], "'radar'.*cone of 0 to 180 degrees"),
+        ([{**radar(), "fov": "wide"}], "fov must be a number"),
     ],
 )
 def test_what_is_wrong_is_said_with_the_sensors_id(sensors, says):
     with pytest.raises(SensorSuiteError, match=says):
         suite_of(sensors)
-
-
-def test_a_second_lidar_is_allowed_by_the_leaderboard_but_not_carried_here():
-    with pytest.raises(SensorSuiteError, match="carries one"):
-        suite_of([lidar("a"), lidar("b")], "SENSORS", "2.1")
 
 
 def test_unknown_tracks_and_leaderboards_list_the_known():

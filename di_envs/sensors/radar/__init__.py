@@ -1,0 +1,1 @@
+"""Radars: distance, direction and speed of what a few rays meet in the scene."""
