@@ -55,7 +55,9 @@ class Pool(Protocol[J, R]):
 @contextmanager
 def processes(workers: int) -> Iterator[Pool[Any, Any]]:
     """A pool of so many processes of this machine, which start as there is work for them."""
-    with ProcessPoolExecutor(workers, FRESH, live_for_parent) as executor:
+    with births():  # the one that tidies up shared memory begins with the pool's queues
+        executor = ProcessPoolExecutor(workers, FRESH, live_for_parent)
+    with executor:
         yield _Processes(executor)
 
 
