@@ -22,7 +22,7 @@ from agents import AgentSpecError
 from agents.agent_process import BAD_SENSORS, MOST_WARNINGS, NO_EDIT, REFUSED, serve
 from agents.base import Control, Observation, Requirements
 from agents.faults import AgentDiedError, AgentFaultError
-from agents.processes import FRESH, ctrl_c_blocked, how_it_ended
+from agents.processes import FRESH, births, how_it_ended, keep_others_out
 from agents.shared_arrays import Sender
 from di_envs.edits.text import EditError, EditText
 from di_envs.files.json_values import JsonError, parsed
@@ -60,8 +60,9 @@ class AgentProcess:
         if self._process is not None and self._process.is_alive():
             return
         self.stop()
+        keep_others_out()  # what the agent may not know is here
         self._connection, theirs = FRESH.Pipe()
-        with ctrl_c_blocked(), contextlib.closing(theirs):
+        with births(), contextlib.closing(theirs):
             place = None
             if self._place is not None and self._where_signal:
                 place = _OpenFile(self._place)

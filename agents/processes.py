@@ -1,10 +1,10 @@
 """Work in processes of this machine: fresh ones, that leave Ctrl-C to their parent and end with it.
 
 Whoever spreads work over processes does it here, so that one rule holds for all. A child is born
-with Ctrl-C and Ctrl-\\ blocked, and ends with its parent: one that is killed, even by a signal that
-nobody can catch, leaves no child behind. On Linux the system sees to that, elsewhere a thread that
-watches a pipe. This lies in `agents`, the lowest room that starts processes; the leaderboard's
-workers and pools use it from above.
+with Ctrl-C and Ctrl-\\ blocked, takes no module from the working folder, and ends with its parent:
+one that is killed, even by a signal that nobody can catch, leaves no child behind. On Linux the
+system sees to that, elsewhere a thread that watches a pipe. This lies in `agents`, the lowest room
+that starts processes; the leaderboard's workers and pools use it from above.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from typing import Any, Protocol, TypeVar
 
 from di_envs.files.caches import CacheWarning
 
-_PR_SET_PDEATHSIG = 1  # of Linux's prctl
+_PR_SET_PDEATHSIG, _PR_SET_DUMPABLE = 1, 4  # of Linux's prctl
+_SAFE_PATH = "PYTHONSAFEPATH"  # the variable of Python that leaves out the working folder
 _FROM_TERMINAL = tuple(  # Windows has no SIGQUIT
     getattr(signal, name) for name in ("SIGINT", "SIGQUIT") if hasattr(signal, name)
 )
@@ -54,7 +55,9 @@ class Pool(Protocol[J, R]):
 @contextmanager
 def processes(workers: int) -> Iterator[Pool[Any, Any]]:
     """A pool of so many processes of this machine, which start as there is work for them."""
-    with ProcessPoolExecutor(workers, FRESH, live_for_parent) as executor:
+    with births():  # the one that tidies up shared memory begins with the pool's queues
+        executor = ProcessPoolExecutor(workers, FRESH, live_for_parent)
+    with executor:
         yield _Processes(executor)
 
 
@@ -65,7 +68,7 @@ class _Processes:
         self._executor = executor
 
     def submit(self, work: Callable[[J], R], job: J, /) -> Pending[R]:
-        with ctrl_c_blocked():
+        with births():
             return self._executor.submit(work, job)
 
 
@@ -127,19 +130,34 @@ def _result(pending: Pending[R]) -> R:
 
 
 @contextmanager
-def ctrl_c_blocked() -> Iterator[None]:
-    """Processes born within never die of Ctrl-C, or Ctrl-\\, not even while they load.
+def births() -> Iterator[None]:
+    """Processes born within are born as they should be, whoever starts them.
 
-    Windows has no such masks: there it does nothing.
+    They never die of Ctrl-C, or Ctrl-\\, not even while they load; Windows has no such masks. And
+    they load Python's own modules, not a `multiprocessing.py` of the working folder, which comes
+    first for a fresh process: it may be a folder that somebody sent.
     """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FROM_TERMINAL)
+    masks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _FROM_TERMINAL) if masks else ()
+    said = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        os.environ.pop(_SAFE_PATH, None)
+        if said is not None:
+            os.environ[_SAFE_PATH] = said
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def keep_others_out() -> None:
+    """From now on no other process of the same user can look into this one, or trace it.
+
+    On Linux; root still can, and there are no core dumps any more.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
 
 
 def _end_with_parent() -> None:
@@ -176,6 +194,7 @@ def leave_warnings_to_parent() -> None:
 
 def live_for_parent() -> None:
     """In a child: leaves Ctrl-C to the parent, and has the child end when the parent does."""
+    os.environ.pop(_SAFE_PATH, None)  # it was for the birth, not for what is started here
     for number in _FROM_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
     leave_warnings_to_parent()

@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
-from agents.processes import live_for_parent
+from agents.processes import births, live_for_parent
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
@@ -317,7 +317,9 @@ def rendered(
         **ahead,
     )
     try:
-        yield from loader
+        with births():
+            batches = iter(loader)
+        yield from batches
     except (TrainingError, DriveFileError) as error:  # another process's brings its whole trace
         last = str(error).strip().splitlines()[-1]
         raise TrainingError(last.rpartition("Error: ")[2]) from error

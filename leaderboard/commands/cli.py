@@ -152,7 +152,7 @@ def _plain_warnings() -> Iterator[None]:
         if str(message) not in told:
             told.add(str(message))
             for line in str(message).splitlines():
-                complain(line, "[yellow]warning[/yellow]")
+                complain(line, "warning", "yellow")
 
     with warnings.catch_warnings():
         warnings.showwarning = show

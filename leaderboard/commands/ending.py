@@ -8,7 +8,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from rich.markup import escape
+from rich.text import Text
 
 from leaderboard.running.terminal import Terminal
 
@@ -24,17 +24,24 @@ class UsageError(Exception):
     """What the user asked for cannot be done; one line that says what to do instead."""
 
 
-def complain(message: str, kind: str = "[red]error[/red]") -> None:
-    """Prints one line on stderr: the kind, then the message."""
+def complain(message: str, kind: str = "error", style: str = "red") -> None:
+    """Prints one line on stderr: the kind, in a style, then the message."""
     from di_envs.files.plain_text import one_plain_line  # loads more than a list of commands needs
 
     line = one_plain_line(message, LONGEST_LINE)
-    Terminal(stderr=True, soft_wrap=True, highlight=False).print(f"{kind}: {escape(line)}")
+    said = Text.assemble((kind, style), f": {line}")
+    Terminal(stderr=True, soft_wrap=True, highlight=False).print(said)
 
 
 def say(*lines: object) -> None:
-    """Prints lines on stdout as they are: paths and commands that can be copied whole."""
-    Terminal().print(*lines, sep="\n", highlight=False, soft_wrap=True, markup=False)
+    """Prints lines on stdout as they are: paths and commands that can be copied whole.
+
+    Each stays one line: a name with a line break in it could say a verdict of its own.
+    """
+    from di_envs.files.shown_text import in_one_line  # as above
+
+    said = (in_one_line(str(line)) for line in lines)
+    Terminal().print(*said, sep="\n", highlight=False, soft_wrap=True)
 
 
 def typed(argument: Path | str) -> str:

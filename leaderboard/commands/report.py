@@ -68,7 +68,7 @@ class Report:
         for film in films:
             if film.problem:
                 name = f"route {film.record.route_id}, seed {film.record.seed}"
-                complain(f"{name} has no replay: {film.problem}", "[yellow]warning[/yellow]")
+                complain(f"{name} has no replay: {film.problem}", "warning", "yellow")
         shown = sum(bool(film.block) for film in films)
         say(
             f"Written: {path} ({size / 1e6:.1f} MB, replays of {shown} of {len(films)} routes), "

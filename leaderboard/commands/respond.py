@@ -83,6 +83,8 @@ class Respond:
         run = trusted_run(run, agent=self.agent, trust=self.trust)
         records = self._chosen(run)
         target = self.output or folder / FOLDER
+        if self.output is None and target.is_symlink():
+            raise UsageError(f"{target} leads to another folder: name one with --output")
         try:
             drives = self._measure(run, records, target)
             written = self._written(target, drives)

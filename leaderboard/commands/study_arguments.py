@@ -129,7 +129,7 @@ def _drive(arguments: StudyArguments, question: StudyQuestion) -> int:
         keep_study(folder, study)
     _print(study, folder, question)
     if interrupted:
-        complain("the same command goes on from here", "[yellow]interrupted[/yellow]")
+        complain("the same command goes on from here", "interrupted", "yellow")
         return EXIT_INTERRUPTED
     return 0 if study.complete else EXIT_CRASHED
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from di_envs.files.shown_text import in_figure
 from leaderboard.studies.ablation import Ablation, RowFinding
 from leaderboard.studies.effects import EQUIVALENT, MARGIN_DS, MATTERS
 
@@ -39,13 +40,13 @@ def write_ablation_picture(path: Path, ablation: Ablation) -> bool:
     for place, row in enumerate(rows):
         _draw_row(axes, place, row)
     _mark_groups(axes, rows)
-    axes.set_yticks(range(len(rows)), [row.driven.row.edit for row in rows])
+    axes.set_yticks(range(len(rows)), [in_figure(row.driven.row.edit) for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xlabel("difference of driving score to the baseline, in the same worlds")
     axes.grid(axis="x", alpha=0.3)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    axes.set_title(_title(ablation), loc="left", fontsize=10)
+    axes.set_title(in_figure(_title(ablation)), loc="left", fontsize=10)
     figure.legend(handles=_legend(ablation), loc="outside lower center", ncols=5, frameon=False,
                   fontsize=8)  # fmt: skip
     figure.savefig(path, dpi=130)

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from di_envs.files.shown_text import in_figure
 from leaderboard.responding.drive_responses import DriveResponses, plain_words
 from leaderboard.responding.moments import moment_name, stretches
 
@@ -72,14 +73,15 @@ def gradient_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
         count + 1, 1, sharex=True, height_ratios=[1.0] * count + [1.6], squeeze=False
     )[:, 0]
     figure.suptitle(
-        f"Gradients of the waypoints with respect to each component's tokens\n{drive.name}, "
-        f"{drive.title}",
+        f"Gradients of the waypoints with respect to each component's tokens\n{_whose(drive)}",
         fontsize=11,
     )
     for place, (axes, name) in enumerate(zip(rows, drive.groups, strict=False)):
         axes.plot(drive.time_s, drive.gradient[:, place, 0], color="#1f4e79", lw=1.2, label="Gx")
         axes.plot(drive.time_s, drive.gradient[:, place, 1], color="#c8553d", lw=1.2, label="Gy")
-        axes.set_ylabel(plain_words(name), rotation=0, ha="right", va="center", fontsize=9)
+        axes.set_ylabel(
+            in_figure(plain_words(name)), rotation=0, ha="right", va="center", fontsize=9
+        )
         axes.set_ylim(bottom=0.0)
         axes.yaxis.set_label_coords(-0.055, 0.5)
         _finish(axes, drive, marked)
@@ -94,7 +96,7 @@ def attention_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     """What each head attends to, as shares over the route."""
     _, layers, heads, _ = drive.attention.shape
     figure, panels = _panels(layers, heads, width=2.6, height=1.7, top=1.3)
-    figure.suptitle(f"Attention of each head over the route\n{drive.name}, {drive.title}")
+    figure.suptitle(f"Attention of each head over the route\n{_whose(drive)}")
     for layer in range(layers):
         for head in range(heads):
             axes = panels[layer][head]
@@ -110,7 +112,10 @@ def attention_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
         axes.set_xlabel("game time [s]", fontsize=8)
     patches = [_patch(colour) for colour in _colours(drive)]
     figure.legend(
-        patches, [plain_words(name) for name in drive.groups], loc="outside lower center", ncols=5
+        patches,
+        [in_figure(plain_words(name)) for name in drive.groups],
+        loc="outside lower center",
+        ncols=5,
     )
     return figure
 
@@ -119,7 +124,7 @@ def head_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
     """Bars for each head at the marked moments; the line is the mean over the drive."""
     _, layers, heads, count = drive.attention.shape
     figure, panels = _panels(layers, heads, width=2.7, height=1.9, top=1.9)
-    figure.suptitle(f"Attention of each head at marked moments\n{drive.name}, {drive.title}")
+    figure.suptitle(f"Attention of each head at marked moments\n{_whose(drive)}")
     mean = drive.attention.mean(axis=0)
     step = 0.8 / max(len(marked), 1)
     for layer in range(layers):
@@ -134,7 +139,7 @@ def head_figure(drive: DriveResponses, marked: Sequence[int]) -> Figure:
             _head_title(axes, layer, head)
             axes.tick_params(labelsize=7)
     for axes in panels[-1]:
-        labels = [plain_words(name) for name in drive.groups]
+        labels = [in_figure(plain_words(name)) for name in drive.groups]
         axes.set_xticks(np.arange(count), labels, rotation=90, fontsize=7)
     names = [moment_name(drive, index) for index in marked]
     patches = [_patch(_colour(place)) for place in range(len(marked))]
@@ -156,7 +161,7 @@ def _situation_strips(axes: Any, drive: DriveResponses) -> None:
         for first, last in stretches(drive.holding(name)):
             start, end = drive.time_s[first] - half, drive.time_s[last - 1] + half
             axes.barh(row, end - start, left=start, height=0.8, color=SITUATION_COLOURS[name])
-    names = [plain_words(name) for name in drive.situations]
+    names = [in_figure(plain_words(name)) for name in drive.situations]
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.invert_yaxis()
 
@@ -174,6 +179,10 @@ def _finish(axes: Any, drive: DriveResponses, marked: Sequence[int], names: bool
     axes.set_xlim(drive.time_s[0], last_s)
     axes.tick_params(labelsize=7)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _whose(drive: DriveResponses) -> str:
+    return in_figure(f"{drive.name}, {drive.title}")
 
 
 def _head_title(axes: Any, layer: int, head: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from di_envs.files.plain_text import plain
+from di_envs.files.shown_text import in_markdown
 from di_envs.files.whole import write_whole
 from leaderboard.pages.ablation_picture import write_ablation_picture
 from leaderboard.pages.prompt_pictures import write_prompt_picture
@@ -48,7 +48,7 @@ def write_ablation(folder: Path, ablation: Ablation) -> list[Path]:
     picture, table = folder / PICTURE_FILE, folder / TABLE_FILE
     try:
         drawn = write_ablation_picture(picture, ablation)
-        write_whole(table, plain(ablation_markdown(ablation, PICTURE_FILE if drawn else "")))
+        write_whole(table, ablation_markdown(ablation, PICTURE_FILE if drawn else ""))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [table, picture] if drawn else [table]
@@ -64,19 +64,20 @@ def write_prompt_editing(folder: Path, study: Study) -> list[Path]:
         StudyError: If something cannot be.
     """
     ablation = work_out(study)
-    lines, written = [f"# {title(ablation)}", ""], []
+    lines, written = [f"# {in_markdown(title(ablation))}", ""], []
     try:
         for judgement in judgements_of(study):
             picture = folder / f"{judgement.experiment}.png"
             experiment = EXPERIMENTS[judgement.experiment]
             lines += [f"## {experiment.title[0].upper()}{experiment.title[1:]}", ""]
-            lines += [f"The paper: {experiment.claim}.", "", finding_sentence(judgement), ""]
+            lines += [f"The paper: {experiment.claim}.", ""]
+            lines += [in_markdown(finding_sentence(judgement)), ""]
             if write_prompt_picture(picture, judgement):
                 written.append(picture)
                 lines += [f"![{experiment.title}]({picture.name})", ""]
-        lines += [f"- {line}" for line in missing_lines(study)]
+        lines += [f"- {in_markdown(line)}" for line in missing_lines(study)]
         lines += ["", *table_lines(ablation)]
-        write_whole(folder / TABLE_FILE, plain("\n".join(lines)))
+        write_whole(folder / TABLE_FILE, "\n".join(lines))
     except OSError as error:
         raise StudyError(f"cannot write to {folder} ({error.strerror})") from error
     return [folder / TABLE_FILE, *written]

@@ -6,7 +6,7 @@ Tables, pages and verdicts show the same lines, so that nobody has to look into 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from agents.ownership import code_of_others
 from leaderboard.records.record import RunRecord
@@ -25,11 +25,41 @@ def claim_lines(run: RunRecord) -> Iterator[str]:
     said = f"; options: {', '.join(given)}" if given else "; no options"
     yield f"Driven on {run.suite} ({version}){said}."
     yield f"The agent asked for: {asked_for(run.requires)}."
+    if changed := changes_of_worlds(run):
+        count = sum(bool(changes) for changes in changed)
+        texts = "; ".join(dict.fromkeys(text for changes in changed for text in changes))
+        yield (
+            f"The world of {count} of {len(changed)} routes was changed: {texts}. Their scores are "
+            "not those of the suite."
+        )
     if in_reach(run):
         yield NOT_ISOLATED
 
 
-def in_reach(run: RunRecord) -> bool:
+def changes_of_worlds(run: RunRecord) -> list[tuple[str, ...]]:
+    """By route what was done to it beside the edits that the run names; empty if nothing was.
+
+    Those of the run are of what the agent saw; a drive that `branch` made has edits of the world.
+    """
+    known = frozenset(run.interventions)
+    found = [tuple(t for t in each.interventions if t not in known) for each in run.routes]
+    return found if any(found) else []
+
+
+class Claim(Protocol):
+    """What says how an agent was driven: a run, or a study."""
+
+    @property
+    def agent(self) -> str: ...
+    @property
+    def track(self) -> str: ...
+    @property
+    def requires(self) -> Mapping[str, Any]: ...
+    @property
+    def isolated(self) -> bool: ...
+
+
+def in_reach(run: Claim) -> bool:
     """Whether the agent could reach more of the world than its track allows."""
     privileged = run.requires.get("privileged", run.track == "PRIVILEGED")
     return not (run.isolated or privileged) and bool(code_of_others(run.agent))
@@ -50,7 +80,8 @@ def asked_for(requires: Mapping[str, Any]) -> str:
 
 def _text(value: Any) -> str:
     if isinstance(value, Mapping) and isinstance(value.get("cameras"), list):
-        each = (f"{c['name']} {c['width']}x{c['height']}" for c in value["cameras"])
+        looks = (c for c in value["cameras"] if isinstance(c, Mapping))
+        each = (f"{c.get('name')} {c.get('width')}x{c.get('height')}" for c in looks)
         return f"({', '.join(each)})"
     if isinstance(value, Mapping):
         return "of its own"

@@ -185,6 +185,8 @@ def read_route(file: Path, run: RunRecord) -> RouteRecord:
     record = _sound(lambda: route_from_json(content, str(file)))
     if file.stem != f"{record.index:04d}" or record.index >= run.planned:
         raise ResultsError(f"{file} holds route number {record.index}: it was renamed")
+    if record.seed not in run.seeds:
+        raise ResultsError(f"{file} is of seed {record.seed}, which the run does not have")
     return record
 
 

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from di_envs.files.json_values import JsonError, from_json, to_json
+from di_envs.files.plain_text import one_plain_line
+from di_envs.rules import RULES
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.versions import INFORMATION
 
@@ -57,7 +59,27 @@ def run_from_json(content: Mapping[str, Any], source: str = "run") -> RunRecord:
             raise JsonError(f"{source}: unknown field 'routes'; each has a file of its own")
         if name not in ("format", "format_version"):
             values[name] = value
-    return from_json(RunRecord, values, source, complete=True)
+    run = from_json(RunRecord, values, source, complete=True)
+    if run.rules not in RULES:
+        raise JsonError(
+            f"{source}: rules: expected one of {', '.join(RULES)}, got {one_plain_line(run.rules)}"
+        )
+    if not run.seeds or len(set(run.seeds)) < len(run.seeds):
+        given = one_plain_line(str(run.seeds))
+        raise JsonError(f"{source}: seeds: expected some, each once, got {given}")
+    _check_requires(run.requires, source)
+    return run
+
+
+def _check_requires(requires: Mapping[str, Any], source: str) -> None:
+    """Refuses what tables and replays could not read; what is new to this program, they say."""
+    seen, options = requires.get("observations", ()), requires.get("options", {})
+    if not (isinstance(seen, list | tuple) and all(isinstance(name, str) for name in seen)):
+        given = one_plain_line(repr(seen))
+        raise JsonError(f"{source}: requires.observations: expected a list of names, got {given}")
+    if not isinstance(options, Mapping):
+        given = one_plain_line(repr(options))
+        raise JsonError(f"{source}: requires.options: expected options by name, got {given}")
 
 
 def route_to_json(record: RouteRecord) -> dict[str, Any]:
@@ -90,6 +112,9 @@ def route_from_json(content: Mapping[str, Any], source: str = "route") -> RouteR
         raise JsonError(
             f"{source}: score.driving_score: {given!r} is not the product of the others, {product}"
         )
+    if not all(name.isdecimal() and len(name) < 4 for name in record.scenarios):
+        names = one_plain_line(", ".join(record.scenarios))
+        raise JsonError(f"{source}: scenarios: expected the numbers of types, got {names}")
     for name, unpacked in (
         ("controls", record.control_array),
         ("observation_checks", record.check_array),

@@ -10,7 +10,6 @@ from typing import Any
 
 import gymnasium
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress
 
 from agents.base import Agent, Requirements
@@ -78,7 +77,7 @@ def drive(
         env, edits = _environment(spec, requires, filmed=video is not None, camera=camera)
         closing.callback(env.close)
         for note in env.planned.notes:
-            console.print(escape(note), soft_wrap=True, highlight=False)
+            console.print(note, soft_wrap=True, highlight=False, markup=False)
         driver = _edited(edits, agent, spec.agent)
         film = None
         if video is not None:
@@ -126,7 +125,7 @@ def event_line(event: Event) -> str:
     name = EVENT_NAMES[event.kind]
     metres = f", {event.value:.1f} m" if event.value else ""
     place = f"({event.x:.1f}, {event.y:.1f})"
-    return escape(f"{event.tick * TICK_S:7.1f} s  {name}{metres} at {place}")
+    return f"{event.tick * TICK_S:7.1f} s  {name}{metres} at {place}"
 
 
 def record_lines(record: RouteRecord) -> list[str]:
@@ -209,7 +208,7 @@ def _spectator(env: RouteEnv, shown: Progress, film: VideoWriter | None) -> Watc
 
     def watch(info: Mapping[str, Any], observation: dict[str, Any]) -> None:
         for event in info["events"]:
-            shown.print(event_line(event))
+            shown.print(event_line(event), markup=False)
         standing = f"{info['game_time_s']:.1f} s, DS {info['driving_score']:.1f}"
         shown.update(task, completed=info["route_completion"], description=standing)
         if film is not None:

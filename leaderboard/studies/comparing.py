@@ -1,7 +1,8 @@
 """Two runs paired by route and seed: what the second changed, how surely, where and by which event.
 
 A pair is one world driven twice: equal route, seed, traffic, lights, versions and CPU. Runs that do
-not share these are refused, as a difference between them would mean nothing.
+not share these are refused, as a difference between them would mean nothing. Files of the user's
+own are told by what they hold, wherever they are and whatever they are called.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 
 from di_envs.differences import differences
 from di_envs.rules import rules_named
+from di_envs.suite_files import FILE_OPTIONS
 from di_envs.world.kinds import EventKind
 from leaderboard.records.footing import footing_differences, footing_of, record_differences
 from leaderboard.records.record import EventRecord, RouteRecord, RunRecord
@@ -141,15 +143,22 @@ def compare_runs(before: RunRecord, after: RunRecord) -> Comparison:
 def _obstacles(before: RunRecord, after: RunRecord) -> Iterator[str]:
     """Why the worlds of two runs are not the same, a few words each."""
     yield from footing_differences(footing_of(before), footing_of(after))
-    fields = ("suite", "suite_version", "town", "town_hash")
+    by_content = bool(before.world and after.world)
+    own_files = by_content and before.suite_version == after.suite_version == 0
+    names = () if own_files else ("suite",)  # own routes are called as their file is
+    fields = (*names, "suite_version", *(() if by_content else ("town",)), "town_hash")
     found = record_differences(before, after, fields)
-    ours, theirs = ({"option": _world_options(run)} for run in (before, after))
+    ours, theirs = (_world_values(run, names, by_content) for run in (before, after))
     yield from (difference.is_not for difference in (*found, *differences(ours, theirs)))
 
 
-def _world_options(run: RunRecord) -> dict[str, object]:
+def _world_values(run: RunRecord, names: tuple[str, ...], by_content: bool) -> dict[str, object]:
+    """What makes up a run's world beside its routes, which are compared pair by pair."""
     given = {**run.requires.get("options", {}), **run.options}
-    return {name: value for name, value in given.items() if name not in _SEEN_ONLY | _CHOICE}
+    aside = _SEEN_ONLY | _CHOICE | (frozenset(FILE_OPTIONS) if by_content else frozenset())
+    options = {name: value for name, value in given.items() if name not in aside}
+    held = [*names, "town", "signals"] if by_content else []
+    return {"option": options, "content of": {name: run.world.get(name) for name in held}}
 
 
 def _more(

@@ -45,7 +45,7 @@ ROWS_FOLDER = "rows"
 # What must be as it was for a study to go on; rows and seeds may come to it
 _SAME = (
     *("kind", "agent", "agent_version", "requires", "suite", "suite_version", "options", "rules"),
-    *("town_hash", "routes_hash", "interventions", "versions", "cpu"),
+    *("town_hash", "routes_hash", "interventions", "versions", "cpu", "isolated"),
 )
 
 

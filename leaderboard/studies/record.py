@@ -94,6 +94,7 @@ class Study:
         kind: `ablation` or `prompt editing`.
         interventions: Edits that all rows share, the baseline too.
         requires: As a run's.
+        isolated: As a run's.
         versions: Package versions; with `cpu` what bits depend on.
         rows: The baseline first, then the null row.
         extra: Further measures, by name, of studies that have any.
@@ -115,6 +116,7 @@ class Study:
     versions: Mapping[str, str]
     cpu: str
     seeds: tuple[int, ...]
+    isolated: bool = False
     rows: tuple[DrivenRow, ...] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
 
@@ -169,4 +171,5 @@ def study_of(kind: str, head: RunRecord, interventions: tuple[str, ...]) -> Stud
         versions=head.versions,
         cpu=head.cpu,
         seeds=head.seeds,
+        isolated=head.isolated,
     )

@@ -87,6 +87,7 @@ def read_study(path: Path) -> Study:
 
 def _study_from_json(content: dict[str, Any], source: str) -> Study:
     content.pop("findings", None)
+    content.setdefault("isolated", False)  # in studies from before it was kept
     columns = from_json(
         tuple[str, ...], content.pop("drive_columns", None), source, "drive_columns"
     )

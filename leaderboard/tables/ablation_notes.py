@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from leaderboard.records.claim_text import NOT_ISOLATED, in_reach
 from leaderboard.statistics.bootstrap import FEW_ROUTES
 from leaderboard.studies.ablation import Ablation, Correlation
 from leaderboard.studies.effects import ALPHA, MARGIN_DS, POWER
@@ -17,6 +18,7 @@ _LOW_DS = 4.0 * MARGIN_DS  # a baseline below that cannot fall by much
 def notes(ablation: Ablation) -> list[str]:
     """All that applies, a line each."""
     return [
+        *([NOT_ISOLATED] if in_reach(ablation.study) else []),
         *_how_to_read(ablation),
         *_of_the_paper(ablation),
         *_of_a_low_baseline(ablation.study),

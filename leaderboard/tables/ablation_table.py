@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.console import Group
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from di_envs.files.shown_text import in_markdown, in_one_line
 from leaderboard.studies.ablation import Ablation
 from leaderboard.studies.ablation_findings import sentences
 from leaderboard.studies.effects import MATTERS
@@ -41,7 +41,7 @@ def ablation_tables(ablation: Ablation) -> Group:
 
 def _table(name: str, head: Sequence[str], rows: Cells, plain: int) -> Table:
     """The first rows, which are compared with nothing, stand by themselves."""
-    table = Table(title=escape(name), title_justify="left", title_style="bold")
+    table = Table(title=in_one_line(name), title_justify="left", title_style="bold")
     for column in head:
         left = column in _LEFT
         whole = column == "interval"
@@ -49,7 +49,7 @@ def _table(name: str, head: Sequence[str], rows: Cells, plain: int) -> Table:
             column, justify="left" if left else "right", overflow="fold", no_wrap=whole
         )
     for number, cells in enumerate(rows, start=1):
-        table.add_row(*map(escape, cells), style="bold" if MATTERS in cells else None)
+        table.add_row(*cells, style="bold" if MATTERS in cells else None)
         if number == plain:
             table.add_section()
     return table
@@ -62,7 +62,7 @@ def ablation_markdown(ablation: Ablation, picture: str = "") -> str:
         ablation: The study worked out.
         picture: File name of its figure, beside it; none if empty.
     """
-    lines = [f"# {title(ablation)}", ""]
+    lines = [f"# {in_markdown(title(ablation))}", ""]
     if picture:
         lines += [f"![Differences of driving score with their intervals]({picture})", ""]
     return "\n".join([*lines, *table_lines(ablation)])
@@ -83,7 +83,7 @@ def table_lines(ablation: Ablation) -> list[str]:
         for row in ablation.rows
     ]
     lines += markdown_table(("row", *map(kind_name, kinds)), cells)
-    return [*lines, "", "## Notes", "", *(f"- {line}" for line in notes(ablation)), ""]
+    return [*lines, "", "## Notes", "", *(f"- {in_markdown(line)}" for line in notes(ablation)), ""]
 
 
 def _beside_paper(ablation: Ablation) -> list[str]:
@@ -99,4 +99,4 @@ def _beside_paper(ablation: Ablation) -> list[str]:
         if row.driven.row.component in TABLE_2
     ]
     table = markdown_table(("row", "here", "verdict", "there", "verdict there"), cells)
-    return [*table, "", *(f"- {line}" for line in sentences(ablation))]
+    return [*table, "", *(f"- {in_markdown(line)}" for line in sentences(ablation))]

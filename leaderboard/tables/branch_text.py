@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
+from di_envs.files.shown_text import in_one_line
 from leaderboard.records.record import EventRecord, RouteRecord
 from leaderboard.replaying.branch import Branch
 from leaderboard.scoring.names import EVENT_NAMES
@@ -25,6 +26,7 @@ def _titles(branch: Branch) -> tuple[str, str]:
 def _scores(branch: Branch) -> Table:
     edited = branch.edited
     title = f"Route {edited.route_id}, seed {edited.seed}, branched at {branch.at_s:g} s"
+    title = in_one_line(title)
     table = Table("future", "status", "DS", "RC %", "IS", "time s", title=title)
     pairs = zip(_titles(branch), (branch.recorded, edited), strict=True)
     for name, record in pairs:

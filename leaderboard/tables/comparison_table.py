@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from rich.console import Group
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from di_envs.files.shown_text import in_one_line
 from leaderboard.records.record import EventRecord
 from leaderboard.scoring.names import EVENT_NAMES
 from leaderboard.statistics.bootstrap import FEW_ROUTES, BootstrapInterval
@@ -31,9 +31,9 @@ def comparison_tables(comparison: Comparison) -> Group:
 
 def _score_table(comparison: Comparison) -> Table:
     before, after = comparison.before, comparison.after
+    title = f"{before.title} and {after.title} on {before.suite} · rules {before.rules}"
     table = Table(
-        title=f"{escape(before.title)} and {escape(after.title)} on {escape(before.suite)}"
-        f" · rules {before.rules}",
+        title=in_one_line(title),
         title_justify="left",
         title_style="bold",
     )
@@ -73,12 +73,12 @@ def _change_table(changes: Sequence[Pair]) -> Table:
     table.add_column("by", overflow="fold")
     for pair in changes:
         table.add_row(
-            escape(pair.before.route_id),
+            pair.before.route_id,
             str(pair.before.seed),
             f"{pair.before.score.driving_score:.1f}",
             f"{pair.after.score.driving_score:.1f}",
             f"{pair.difference:+.1f}",
-            escape(_reasons(pair)),
+            _reasons(pair),
         )
     return table
 

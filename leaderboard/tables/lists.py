@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 
-from rich.markup import escape
 from rich.table import Table
 
 from agents import AGENTS, SCHEMES, AgentSpecError, load_agent
@@ -20,7 +19,7 @@ def agent_table() -> Table:
         table.add_column(column)
     for name, entry in AGENTS.items():
         if not entry.data.startswith(_ZOO):
-            table.add_row(name, _track(name), escape(entry.summary))
+            table.add_row(name, _track(name), entry.summary)
     return table
 
 
@@ -60,7 +59,7 @@ def scheme_table() -> Table:
         table.add_column(column)
     for entry in SCHEMES.values():
         spec, _, summary = entry.summary.partition(": ")
-        table.add_row(escape(spec), escape(summary))
+        table.add_row(spec, summary)
     return table
 
 
@@ -90,7 +89,7 @@ def suite_table() -> Table:
             suite.town,
             str(len(suite.specs())),
             *_traffic_cells(suite),
-            escape(suite.description),
+            suite.description,
         )
     return table
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from di_envs.files.plain_text import plain
+from di_envs.files.shown_text import in_markdown
 
 
 def markdown_table(
@@ -21,5 +21,4 @@ def markdown_table(
 
 
 def _line(cells: Sequence[str]) -> str:
-    shown = (plain(cell).replace("|", "\\|").replace("\n", ", ") for cell in cells)
-    return "| " + " | ".join(shown) + " |"
+    return "| " + " | ".join(map(in_markdown, cells)) + " |"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rich.markup import escape
 from rich.table import Table
 
+from di_envs.files.shown_text import in_one_line
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.studies.comparing import SCORES
 
@@ -15,7 +15,7 @@ from leaderboard.studies.comparing import SCORES
 def rescoring_table(run: RunRecord, other: RunRecord) -> Table:
     """The routes of one run under two rule sets, side by side, and their means."""
     table = Table(
-        title=f"{escape(run.agent)} on {escape(run.suite)} · {run.rules} and {other.rules}",
+        title=in_one_line(f"{run.agent} on {run.suite} · {run.rules} and {other.rules}"),
         title_justify="left",
         title_style="bold",
     )
@@ -29,7 +29,7 @@ def rescoring_table(run: RunRecord, other: RunRecord) -> Table:
     for ours, theirs in pairs:
         change = theirs.score.driving_score - ours.score.driving_score
         table.add_row(
-            escape(ours.route_id),
+            ours.route_id,
             str(ours.seed),
             *_score_cells([ours]),
             *_score_cells([theirs]),

@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console, Group
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from di_envs.files.shown_text import in_one_line
 from di_envs.rules import DI_1_0, Rules, rules_named
 from leaderboard.records.claim_text import claim_lines
 from leaderboard.records.record import RouteRecord, RunRecord
@@ -44,8 +44,8 @@ def print_run(run: RunRecord, console: Console) -> None:
 
 def _route_table(run: RunRecord) -> Table:
     ours = by_our_rules(run)
-    title = f"{escape(run.title)} on {escape(run.suite)} · track {run.track} · rules {run.rules}"
-    table = Table(title=title, title_justify="left", title_style="bold")
+    title = f"{run.title} on {run.suite} · track {run.track} · rules {run.rules}"
+    table = Table(title=in_one_line(title), title_justify="left", title_style="bold")
     table.add_column("route")
     for name in ("DS", *([f"DS\n{DI_1_0.name}"] if ours else []), "RC", "IS", "bound", "infr./km"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -54,11 +54,11 @@ def _route_table(run: RunRecord) -> Table:
         records = [record for record in run.routes if record.route_id == route_id]
         driving, *cells = _cells(records, run)
         own = [_driving_cell(ours, route_id)] if ours else []
-        table.add_row(escape(route_id), driving, *own, *cells)
+        table.add_row(route_id, driving, *own, *cells)
     for route_id, why in run.refused.items():
         reason = _briefly(why.removeprefix(f"Route '{route_id}': "))
         blank = ["-"] * (6 if ours else 5)
-        table.add_row(escape(route_id), *blank, escape(f"could not be planned: {reason}"))
+        table.add_row(route_id, *blank, f"could not be planned: {reason}")
     table.add_section()
     driving, *cells = _mean_cells(run)
     own = [_stacked(driving_interval(ours))] if ours else []
@@ -88,7 +88,7 @@ def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
     """DS, RC, IS, bound, infractions per km and a summary, over the seeds of one route."""
     driven = [record for record in records if not record.lost]
     if not driven:
-        return ["-"] * 5 + [escape(summary(records, rules_named(run.rules)))]
+        return ["-"] * 5 + [summary(records, rules_named(run.rules))]
     scores = [record.score for record in driven]
     return [
         f"{_mean([score.driving_score for score in scores]):.1f}",
@@ -96,7 +96,7 @@ def _cells(records: Sequence[RouteRecord], run: RunRecord) -> list[str]:
         f"{_mean([score.infraction_score for score in scores]):.2f}",
         _bound_cell(driven),
         f"{scored_per_km(driven, run):.2f}",
-        escape(summary(records, rules_named(run.rules))),
+        summary(records, rules_named(run.rules)),
     ]
 
 
@@ -210,7 +210,8 @@ def _caption(run: RunRecord) -> str:
         lines.append(f"DS under {DI_1_0.name} is not known: this run's world did not record it.")
     if not run.complete:
         lines.append(f"Not complete: {len(run.routes)} of {run.planned} routes x seeds.")
-    return "\n".join([*lines, *_refused_lines(run), *_lost_lines(run), *run.notes])
+    lines += [*_refused_lines(run), *_lost_lines(run), *run.notes]
+    return "\n".join(map(in_one_line, lines))
 
 
 def _refused_lines(run: RunRecord) -> list[str]:

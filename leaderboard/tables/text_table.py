@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rich.markup import escape
 from rich.table import Table
 
-from di_envs.files.plain_text import plain
+from di_envs.files.shown_text import in_markdown, in_one_line
 from leaderboard.tables.markdown_table import markdown_table
 
 
@@ -32,21 +31,22 @@ class TextTable:
     def rich(self) -> Table:
         """For a terminal."""
         table = Table(
-            title=escape(self.title),
+            title=in_one_line(self.title),
             title_justify="left",
             title_style="bold",
-            caption=escape("\n".join(self.notes)),
+            caption="\n".join(map(in_one_line, self.notes)),
             caption_justify="left",
         )
         for place, name in enumerate(self.columns):
-            table.add_column(escape(name), justify="left" if place < self.words else "right")
+            table.add_column(name, justify="left" if place < self.words else "right")
         for row in self.rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*row)
         return table
 
     def markdown(self) -> str:
         """For a document."""
         rule = [":--" if place < self.words else "--:" for place in range(len(self.columns))]
-        lines = [f"### {self.title}", "", *markdown_table(self.columns, self.rows, rule)]
-        text = "\n".join([*lines, "", *(f"{note}  " for note in self.notes)])
-        return plain(text.rstrip()) + "\n"
+        table = markdown_table(self.columns, self.rows, rule)
+        lines = [f"### {in_markdown(self.title)}", "", *table, ""]
+        lines += [f"{in_markdown(note)}  " for note in self.notes]
+        return "\n".join(lines).rstrip() + "\n"

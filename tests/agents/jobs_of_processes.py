@@ -17,6 +17,11 @@ def squared(number: int) -> int:
     return number * number
 
 
+def squared_with_variables(number: int) -> tuple[int, str | None]:
+    """The square, and what a process that is started there would be told of safe paths."""
+    return number * number, os.environ.get("PYTHONSAFEPATH")
+
+
 def three_has_no_square(number: int) -> int:
     if number == 3:
         raise ValueError("there is no square of 3")

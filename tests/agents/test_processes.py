@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 from agents.processes import how_it_ended, in_order, processes
 from tests.agents import jobs_of_processes as jobs
+from tests.leaderboard.commands.test_containers import as_nobody, run_in
 
 TOP = Path(__file__).parents[2]
 PATIENCE_S = 60.0
@@ -101,6 +103,74 @@ def test_a_process_that_dies_is_said_to_have_died():
 def test_ctrl_c_is_for_the_parent():
     with processes(1) as pool:
         assert list(in_order(pool, jobs.interrupted, [1, 2], ahead=1)) == [1, 2]
+
+
+SCRIPT = """
+from agents.processes import processes
+from tests.agents.jobs_of_processes import squared_with_variables
+
+if __name__ == "__main__":
+    with processes(1) as pool:
+        print(pool.submit(squared_with_variables, 3).result())
+"""
+
+
+def test_a_process_takes_no_module_from_the_working_folder(tmp_path):
+    (tmp_path / "ours").mkdir()
+    script, folder = tmp_path / "ours" / "script.py", tmp_path / "received"
+    script.write_text(SCRIPT)
+    folder.mkdir()
+    (folder / "multiprocessing.py").write_text("open('PWN', 'w')")
+    words = [sys.executable, str(script)]
+    done = subprocess.run(
+        words,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == "(9, None)\n", done.stderr
+    assert os.listdir(folder) == ["multiprocessing.py"]
+
+
+LOOK = """
+import os
+from agents.processes import keep_others_out
+
+def looked():
+    if os.fork() == 0:
+        try:
+            open(f"/proc/{os.getppid()}/mem", "rb").close()
+            print("open", flush=True)
+        except PermissionError:
+            print("shut", flush=True)
+        os._exit(0)
+    os.wait()
+
+looked()
+keep_others_out()
+looked()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no /proc")
+def test_no_child_reads_the_memory_of_the_process_of_the_world(tmp_path):
+    words = [*as_nobody(), sys.executable, "-c", LOOK]
+    done = run_in(tmp_path, words, DRIVEINSIGHT_CACHE=str(tmp_path))
+    assert done.stdout.split()[-1:] == ["shut"], done.stderr
+
+
+def test_all_processes_are_started_by_one_rule():
+    """A film's encoder ends with the pipe that it reads."""
+    starts = re.compile(r"ProcessPoolExecutor\(|get_context\(|Popen\(|os\.fork|\.Pool\(")
+    found = {
+        path.relative_to(TOP).as_posix()
+        for package in ("di_envs", "agents", "wrappers", "leaderboard")
+        for path in (TOP / package).rglob("*.py")
+        if starts.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == {"agents/processes.py", "leaderboard/running/video.py"}
 
 
 def read_all(pipe: int, size: int) -> bytes:

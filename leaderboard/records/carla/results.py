@@ -22,6 +22,7 @@ from leaderboard.records.carla.words import (
     refused_records,
     sensors_of,
 )
+from leaderboard.records.claim_text import changes_of_worlds
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.scoring.score import infractions_per_km, mean_score
 
@@ -44,11 +45,15 @@ def _results(run: RunRecord, rules: Rules) -> dict[str, Any]:
             "records": records,
         },
         "entry_status": _entry_status(run),
-        "eligible": run.complete and not run.lost and not run.refused,
+        "eligible": _eligible(run),
         "sensors": sensors_of(run),
         "values": values,
         "labels": labels,
     }
+
+
+def _eligible(run: RunRecord) -> bool:
+    return run.complete and not (run.lost or run.refused or changes_of_worlds(run))
 
 
 def _entry_status(run: RunRecord) -> str:

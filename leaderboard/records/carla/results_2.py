@@ -24,6 +24,7 @@ from leaderboard.records.carla.words import (
     refused_records,
     sensors_of,
 )
+from leaderboard.records.claim_text import changes_of_worlds
 from leaderboard.records.record import RouteRecord, RunRecord
 
 _DECIMALS, _SCORE_DECIMALS = 3, 6
@@ -47,7 +48,7 @@ def carla_results_2(run: RunRecord, rules: Rules) -> dict[str, Any]:
             "records": records,
         },
         "entry_status": status,
-        "eligible": status == "Finished",
+        "eligible": status == "Finished" and not changes_of_worlds(run),
         "sensors": sensors_of(run),
         "values": values,
         "labels": labels,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rich.console import Console
-from rich.markup import escape
 
 from leaderboard.records.record import RouteRecord
 from leaderboard.running.displays.compile_bar import CompileBar
@@ -26,7 +25,7 @@ class RunDisplay(Display):
 
     def say(self, line: str, style: str = "") -> None:
         """Prints a line above the bars."""
-        self._bars.print(escape(line), style=style or None, soft_wrap=True, highlight=False)
+        self._bars.print(line, style=style or None, soft_wrap=True, highlight=False, markup=False)
 
     def plan(self, total: int, done: int) -> None:
         """So many jobs there are, and so many are done already."""
@@ -62,7 +61,7 @@ class RunDisplay(Display):
     def _describe(self) -> None:
         names = [_name(job) for job in self._under_way.values()]
         more = [f"{len(names) - _SHOWN} more"] if len(names) > _SHOWN else []
-        self._bars.update(self._driving, description=escape(" · ".join(names[:_SHOWN] + more)))
+        self._bars.update(self._driving, description=" · ".join(names[:_SHOWN] + more))
 
 
 def _name(job: Job | RouteRecord) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import TracebackType
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import TaskID
 from typing_extensions import Self
 
@@ -42,7 +41,7 @@ class StudyDisplay(RunDisplay):
     def row(self, name: str) -> None:
         """This row is driven now."""
         self._bars.reset(self._driving, visible=False)
-        self._bars.update(self._study, description=escape(name))
+        self._bars.update(self._study, description=name)
 
     def plan(self, total: int, done: int) -> None:
         """Of the row under way; what was driven before is counted in the study's bar."""

@@ -44,15 +44,15 @@ def work_bar(
         transient: Whether it goes once the work is done: what comes of it is printed then.
         look_back_s: The remaining time goes by the rate over so long.
     """
-    numbers = [MofNCompleteColumn(), TextColumn(unit)]
+    numbers = [MofNCompleteColumn(), TextColumn(unit, markup=False)]
     kind = CellProgress if in_notebook() else Progress
     return kind(
-        TextColumn(f"  {what}"),
+        TextColumn(f"  {what}", markup=False),
         BarColumn(bar_width=30),
         *([TaskProgressColumn()] if unit == "%" else numbers),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         console=console or Terminal(stderr=True),
         speed_estimate_period=look_back_s,
         transient=transient,

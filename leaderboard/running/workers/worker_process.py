@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from agents.base import Requirements
-from agents.processes import FRESH, ctrl_c_blocked, how_it_ended
+from agents.processes import FRESH, births, how_it_ended
 from leaderboard.records.record import OUT_OF_TIME, WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec
 from leaderboard.running.messages import Died, WorkerMessage
@@ -40,7 +40,7 @@ class WorkerProcess:
         self._process = FRESH.Process(
             target=serve, args=(theirs, cells, spec, Path(self._where.name))
         )
-        with ctrl_c_blocked(), contextlib.closing(theirs):
+        with births(), contextlib.closing(theirs):
             self._process.start()
 
     @property

@@ -11,6 +11,7 @@ from di_envs.suites import DATA, load_suite
 from di_envs.town import cache
 from di_envs.town.loading import load_town
 from leaderboard.commands.cli import main
+from leaderboard.records.carla.results import carla_results
 from leaderboard.records.claim_text import claim_lines
 from leaderboard.records.results import read_run, write_run
 from leaderboard.replaying.verify import verify_run
@@ -111,6 +112,16 @@ def test_what_was_asked_for_stands_in_table_and_verdict(run, tmp_path, capsys):
     asked = "The agent asked for: prompt, a decision every 0.1 s."
     assert shown.count(asked) == 2
     assert shown.count("traffic=0") == 2
+
+
+def test_a_drive_in_a_changed_world_says_so_and_is_not_eligible(run):
+    (record,) = run.routes
+    changed = replace(run, routes=(replace(record, interventions=("remove:actor=1@t=1",)),))
+    (line,) = (line for line in claim_lines(changed) if "changed" in line)
+    assert line.startswith("The world of 1 of 1 routes was changed: remove:actor=1@t=1.")
+    for rules in ("carla-1.0", "carla-2.1"):
+        there = [carla_results(replace(each, rules=rules))["eligible"] for each in (run, changed)]
+        assert there == [True, False]
 
 
 def test_a_run_that_was_not_isolated_says_so(run):

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from PIL import Image
 from rich.console import Console
 
 from leaderboard.pages.study_files import keep_study, write_ablation
+from leaderboard.records.claim_text import NOT_ISOLATED
 from leaderboard.studies import StudyError
 from leaderboard.studies.ablation import work_out
 from leaderboard.studies.ablation_findings import findings, sentences
 from leaderboard.studies.effects import EQUIVALENT, MATTERS
 from leaderboard.studies.rows import ABLATION_ROWS, choose_rows
-from leaderboard.studies.study_file import STUDY_FILE, read_study
+from leaderboard.studies.study_file import STUDY_FILE, read_study, write_study
 from leaderboard.studies.table_two import TABLE_2
 from leaderboard.tables.ablation_table import ablation_markdown, ablation_tables
 from tests.leaderboard.studies.drives_here import drive, row, study
@@ -132,6 +134,20 @@ def test_table_text_and_figure_are_drawn(made, tmp_path):
     shown = console.export_text()
     assert "exactly 0" in shown
     assert "matters" in shown
+
+
+def test_a_study_of_an_agent_that_was_not_isolated_says_so(tmp_path):
+    begun = study(row("baseline", drive()), row("null"), row("drop-map"))
+    assert NOT_ISOLATED in ablation_markdown(work_out(begun))
+    write_study(tmp_path, replace(begun, isolated=True))
+    isolated = read_study(tmp_path)
+    assert isolated.isolated
+    assert NOT_ISOLATED not in ablation_markdown(work_out(isolated))
+    path = tmp_path / "study.json"
+    earlier = json.loads(path.read_text())
+    del earlier["isolated"]  # as before it was kept
+    path.write_text(json.dumps(earlier))
+    assert read_study(tmp_path) == begun
 
 
 def test_a_study_that_has_just_begun_can_be_shown_too(tmp_path):

@@ -129,6 +129,19 @@ def test_runs_of_other_worlds_are_refused(change, message):
         compare_runs(before, replace(after, **change))
 
 
+OWN = {"suite": "", "suite_version": 0, "world": {"suite": "s", "town": "t", "signals": "map"}}
+
+
+def test_own_files_are_told_by_what_they_hold_wherever_they_are():
+    before, after = runs()
+    ours = replace(before, **OWN, options={"town": "/a/one.xodr", "routes": "/a/r.xml"})
+    moved = {"suite": "other", "town": "two", "options": {"town": "/b/two.xodr"}}
+    theirs = replace(after, **{**OWN, **moved})
+    assert len(compare_runs(ours, theirs).pairs) == 3
+    with pytest.raises(PairingError, match="content of 'signals' map, not none"):
+        compare_runs(ours, replace(theirs, world={**OWN["world"], "signals": "none"}))
+
+
 def test_another_python_and_what_only_one_driver_rests_on_are_no_obstacle():
     before, after = runs()
     other = {**after.versions, "python": "3.12", "driveinsight": "0.2", "torch": "2.13.0"}
