@@ -35,7 +35,7 @@ def zoo_table() -> Table:
     for name, entry in AGENTS.items():
         if entry.data.startswith(_ZOO):
             score = entry.score or "not trained"
-            table.add_row(name, *_facts_of(name), score, escape(entry.summary))
+            table.add_row(name, *_facts_of(name), score, entry.summary)
     return table
 
 
