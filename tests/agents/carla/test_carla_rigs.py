@@ -87,8 +87,9 @@ def test_a_semantic_lidar_tells_place_angle_actor_and_tag_and_loses_no_rays(seen
     car = points[points["ObjTag"] == Tag.CAR]
     assert len(car) > 50
     assert set(car["ObjIdx"].tolist()) == {2}
-    facing = car[(car["x"] < 12.0 - HALF_M + 0.05) & (np.abs(car["z"]) < 0.2)]
-    assert (facing["CosAngle"] > 0.95).all()  # its back is square to the rays
+    back = car[(car["x"] < 12.0 - HALF_M + 0.3) & (np.abs(car["z"] + 0.8) < 0.2)]
+    assert len(back) > 5
+    assert np.median(back["CosAngle"]) > 0.95  # it is square to the rays
     ground = points[(points["ObjIdx"] == 0) & (np.abs(points["z"] + 1.5) < 0.01)]
     far = np.sqrt(ground["x"] ** 2 + ground["y"] ** 2 + ground["z"] ** 2)
     np.testing.assert_allclose(ground["CosAngle"], 1.5 / far, atol=1e-3)
@@ -100,7 +101,7 @@ def test_a_radar_tells_distance_elevation_azimuth_and_speed_away(seen):
     assert rows.dtype == np.float32
     assert 10 < len(rows) <= 75  # 1500 a second
     car = rows[rows[:, 3] > 0.0]
-    np.testing.assert_allclose(car[:, 0] * np.cos(car[:, 1]), 12.0 - HALF_M - 2.0, atol=0.6)
+    assert car[:, 0].min() == pytest.approx(12.0 - HALF_M - 2.0, abs=0.3)
     np.testing.assert_allclose(car[:, 3], 2.0, atol=0.03)
     ground = rows[rows[:, 3] < 0.0]
     np.testing.assert_allclose(ground[:, 0] * np.sin(-ground[:, 1]), 0.8, atol=0.02)
