@@ -93,7 +93,7 @@ def test_a_class_typed_into_a_cell_is_scored_with_two_workers_compared_and_branc
         text=True,
         check=False,
         cwd=tmp_path,
-        timeout=600,
+        timeout=1200,
         env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
