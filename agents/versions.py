@@ -10,6 +10,7 @@ import hashlib
 import importlib.util
 import sys
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -44,13 +45,15 @@ def agent_packages(spec: str, loaded: Collection[str] | None = None) -> tuple[st
     Args:
         spec: See `agents.load_agent`.
         loaded: `loaded_packages` where such an agent was made; None where none was. Of those that
-            code of others may load, the others do not count then.
+            code of others may load these count then, and those that its own files name, as some
+            are loaded with the first route. One that another module loads so late is not seen.
     """
     entry = AGENTS.get(named(spec)[0]) or SCHEMES.get(spec.partition(":")[0])
     packages = entry.packages if entry is not None else OF_OTHERS
-    if packages == OF_OTHERS and loaded is not None:
-        return tuple(name for name in packages if name in loaded)
-    return packages
+    if packages != OF_OTHERS or loaded is None:
+        return packages
+    text = b"".join(file.read_bytes() for file in _files_of_others(spec))
+    return tuple(n for n in packages if n in loaded or _module(n).encode() in text)
 
 
 # Code of others may load any of these, and does not say so
@@ -59,7 +62,24 @@ OF_OTHERS = SCHEMES["carla"].packages
 
 def loaded_packages() -> tuple[str, ...]:
     """Those of `OF_OTHERS` that this process has loaded."""
-    return tuple(name for name in OF_OTHERS if name.replace("-", "_") in sys.modules)
+    return tuple(name for name in OF_OTHERS if _module(name) in sys.modules)
+
+
+def _module(package: str) -> str:
+    return package.replace("-", "_")
+
+
+def _files_of_others(spec: str) -> list[Path]:
+    """Those that a specification names: code, settings, pickles; without what is not there."""
+    scheme, _, place = spec.partition(":")
+    if scheme in SCHEMES:
+        path, options = place_and_options(spec, place)
+        found = [Path(path), *map(Path, options.values())]
+    else:
+        found = []
+        with suppress(FileNotFoundError):
+            found = [_code_of(spec.rpartition(":")[0])]
+    return [file for file in found if file.is_file()]
 
 
 def _declared(name: str, entry: AgentEntry, places: Sequence[Path]) -> str:

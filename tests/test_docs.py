@@ -154,7 +154,7 @@ def test_each_snippet_of_these_pages_runs_alone(page, number, tmp_path):
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=1200,
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )

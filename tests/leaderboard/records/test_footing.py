@@ -143,6 +143,14 @@ def test_torch_counts_below_those_drivers_only_that_load_it():
     assert agent_packages("driveinsight", loaded=()) == ("torch",)  # ours say so themselves
 
 
+def test_a_package_that_an_agents_file_names_counts_before_it_is_loaded(tmp_path):
+    mine = tmp_path / "mine.py"
+    for text, packages in (("x = 1", ()), ("def start():\n    import torch", ("torch",))):
+        mine.write_text(text)
+        for spec in (f"{mine}:Mine", f"carla:{mine}", f"pickled:{mine}"):
+            assert agent_packages(spec, loaded=()) == packages
+
+
 def test_what_only_one_driver_rests_on_is_no_difference_between_their_worlds():
     expert = footing_here("expert")
     learnt = {**footing_here("driveinsight"), "torch": "2.13.0"}

@@ -44,11 +44,13 @@ def test_what_an_agent_may_not_know_is_not_in_its_process():
     assert apart.done_m > 10.0
 
 
-def test_a_process_says_which_packages_its_agent_has_loaded():
+def test_a_process_says_which_packages_its_agent_has_loaded(tmp_path):
+    mine = tmp_path / "mine.py"
+    mine.write_text("import highway_env\nfrom agents.constant import ConstantAgent as Mine\n")
     process = AgentProcess()
     try:
         assert IsolatedAgent(process, "constant").loaded() == ()
-        assert IsolatedAgent(process, "highway").loaded() == ("highway-env",)
+        assert IsolatedAgent(process, f"{mine}:Mine").loaded() == ("highway-env",)
     finally:
         process.stop()
 

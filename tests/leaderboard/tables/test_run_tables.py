@@ -29,5 +29,5 @@ def test_in_eighty_columns_no_word_of_what_happened_is_broken():
     lines = console.file.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     words = console.file.getvalue().replace("│", " ").split()
-    for word in ("town05_long_12", "vehicle", "outside", "lanes,", "45.0", "22.4"):
+    for word in ("town05_long_12", "vehicle", "outside", "lanes,", "45.0", "12.4"):
         assert word in words, console.file.getvalue()
