@@ -154,6 +154,7 @@ AGENTS: dict[str, AgentEntry] = {
         packages=("stable-baselines3", "torch"),
     ),
     "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
+    "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",

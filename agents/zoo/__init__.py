@@ -4,6 +4,7 @@ system.py      what a system says of itself: what it sees and is to learn, its n
 registry.py    systems by the names that the table of agents has for them
 inputs.py      from what an environment shows to what a network takes
 raster.py      the true view from above, for teachers
+eyes.py        cameras, and a LiDAR, to a map of the ground, and what is remembered of it
 told.py        the prompt's components as tokens
 errors.py      terms of losses that several systems share
 loading.py     the driver of whichever system a folder holds

@@ -26,7 +26,7 @@ CONTROL_DT_S = 0.1
 MOMENT_DT_S = 0.5  # between the moments of a sequence, and between waypoints
 # The family of cameras that all systems see by: each names those that its paper has.
 FAMILY = RIGS["driveinsight"]
-LABELS = ("action", "raster", "semantics", "objects", "signal")
+LABELS = ("action", "raster", "semantics", "objects", "signal", "map", "motion", "future")
 
 Seen = Mapping[str, Tensor]  # what a system sees at a moment, (B, ...) each; see `inputs.inputs_of`
 Labels = Mapping[str, Tensor]  # what it is to say, (B, ...) each; see `training.labels`
