@@ -127,7 +127,7 @@ class Vad(SystemModel):
         return Output(waypoints=(STEP_M * steps.float()).cumsum(dim=1), said=said, state=state)
 
     def _vectors(self, said: dict[str, Tensor]) -> Tensor:
-        """(B, A, 1 + BOX) about 1 in size; what others say is learnt from them, not from the plan."""
+        """(B, A, 1 + BOX) about 1 in size; boxes are not learnt from the plan."""
         boxes = said["boxes"].detach()
         there = said["presence"].detach().sigmoid()[..., None]
         return torch.cat([there, boxes[..., :2] / METRES, boxes[..., 2:]], dim=2)
