@@ -6,6 +6,7 @@ inputs.py      from what an environment shows to what a network takes
 raster.py      the true view from above, for teachers
 eyes.py        cameras, and a LiDAR, to a map of the ground, and what is remembered of it
 told.py        the prompt's components as tokens
+commands.py    three commands of a prompt's six
 errors.py      terms of losses that several systems share
 loading.py     the driver of whichever system a folder holds
 driving.py     the agent that drives with any of them, and what it says of itself when explained

@@ -10,13 +10,14 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from agents.driveinsight.rows import METRES, one_hot
+from agents.driveinsight.rows import METRES
 from agents.explain.protocol import Anatomy, TokenGroup
 from agents.networks.blocks import conv_block
 from agents.networks.decoder import DecoderLayer, MixingLayer
 from agents.networks.mlp import mlp
 from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import STEP_M
+from agents.zoo.commands import COMMANDS, command_of
 from agents.zoo.eyes import BEV, BevEyes, Recall
 from agents.zoo.system import Labels, Output, Seen, State, SystemModel
 from agents.zoo.vad.config import VadConfig
@@ -24,9 +25,6 @@ from agents.zoo.vad.losses import vad_losses
 from di_envs.town.map_chunks import POINTS, MapKind
 
 BOX = 8  # x, y, log length, log width, sine, cosine of the heading, velocity
-COMMANDS = 3  # left, right, neither
-# By `RoadOption` from LEFT on: which of the commands it is
-_COMMAND_OF = (0, 1, 2, 2, 0, 1)
 _COARSER = 2  # cells of the ground to a token
 
 
@@ -122,7 +120,7 @@ class Vad(SystemModel):
         to_lines = self.ask_lines(to_agents, said["lines"] + self.of_lines(self._polylines(said)))
         plans = self.plan(torch.cat([to_agents, to_lines], dim=2))[:, 0]
         plans = plans.unflatten(1, (COMMANDS, self.config.waypoints, 2))
-        chosen = self.command(_command_of(seen["command"]))  # (B, COMMANDS)
+        chosen = self.command(command_of(seen["command"]))  # (B, COMMANDS)
         steps = (plans * chosen[:, :, None, None]).sum(dim=1)
         return Output(waypoints=(STEP_M * steps.float()).cumsum(dim=1), said=said, state=state)
 
@@ -148,12 +146,3 @@ class Vad(SystemModel):
             "command": TokenGroup(tap="command"),
         }
         return Anatomy(groups=groups, maps=self.eyes.maps("eyes"))
-
-
-def _command_of(option: Tensor) -> Tensor:
-    """(B, COMMANDS) 0 or 1 of (B, 1) `RoadOption`; who is told none goes neither left nor right."""
-    table = torch.tensor(_COMMAND_OF, device=option.device)
-    option = option[:, 0].long()
-    known = (option >= 1) & (option <= len(_COMMAND_OF))
-    chosen = torch.where(known, table[(option - 1).clamp(0, len(_COMMAND_OF) - 1)], 2)
-    return one_hot(chosen, COMMANDS)
