@@ -11,6 +11,7 @@ errors.py      terms of losses that several systems share
 loading.py     the driver of whichever system a folder holds
 driving.py     the agent that drives with any of them, and what it says of itself when explained
 controls.py    the published controller, and what stands in for it without rules
+two_heads.py   how those drive that say waypoints and an action
 weights.py     systems on disk
 NAME/          a system: config.py, model.py, agent.py and a card
 """

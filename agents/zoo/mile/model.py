@@ -13,6 +13,8 @@ beside the action, which say where it leads.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -65,7 +67,7 @@ class Decoder(nn.Module):
         super().__init__()
         self.enter = nn.Linear(width, _COARSE * _SIDE * _SIDE)
         widths = (_COARSE, _FINE, _FINE, _FINE)
-        self.up = nn.ModuleList(conv_block(*pair) for pair in zip(widths, widths[1:], strict=False))
+        self.up = nn.ModuleList(conv_block(*pair) for pair in pairwise(widths))
         self.out = nn.Conv2d(_FINE, len(BevClass), 1)
 
     def forward(self, state: Tensor) -> Tensor:
