@@ -160,6 +160,13 @@ class SystemModel(nn.Module, ABC):
             state: What the moment before it, `MOMENT_DT_S` ago, had it remember; None at first.
         """
 
+    def given(self, value: Tensor) -> Tensor:
+        """A value that what comes next is to take as it is: training stops its gradient there.
+
+        While it drives none is stopped, so that whoever explains it sees all that it rests on.
+        """
+        return value.detach() if self.training else value
+
     @abstractmethod
     def loss(self, output: Output, labels: Labels) -> dict[str, Tensor]:
         """The terms that training brings down, by name; their sum is the loss.

@@ -104,7 +104,7 @@ class DriveAdapter(SystemModel):
         latent = latent + self.adapt_latent(torch.cat([latent, around], dim=1))
         policy = self.teacher.action[:-1](latent)  # before it is bent into -1..1
         action = (policy + self.adapt_action(torch.cat([latent, around], dim=1))).tanh()
-        joined = self.join(torch.cat([raw.flatten(1), latent.detach()], dim=1))
+        joined = self.join(torch.cat([raw.flatten(1), self.given(latent)], dim=1))
         said = {f"feature{n}": feature for n, feature in enumerate(features)}
         said |= {"latent": latent, "masks": masks, "speed": speed}
         return Output(waypoints=self.plan(joined), action=action, said=said, state=state)

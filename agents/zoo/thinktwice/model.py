@@ -100,7 +100,8 @@ class ThinkTwice(SystemModel):
         plan = Plan(waypoints=self.coarse(known), action=self.act(known))
         plans = [plan]
         for again in self.again:
-            plan = plan.detached()  # what was planned is given: it learns to mend it
+            # what was planned is given: it learns to mend it
+            plan = Plan(waypoints=self.given(plan.waypoints), action=self.given(plan.action))
             offsets = again(plan, known, ground).offsets
             plan = Plan(
                 waypoints=plan.waypoints + offsets.waypoints, action=plan.action + offsets.action

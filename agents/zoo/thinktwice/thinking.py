@@ -32,10 +32,6 @@ class Plan:
     waypoints: Tensor
     action: Tensor
 
-    def detached(self) -> Plan:
-        """The same, from which nothing is learnt."""
-        return Plan(waypoints=self.waypoints.detach(), action=self.action.detach())
-
 
 @dataclass(frozen=True, kw_only=True)
 class Thought:

@@ -126,14 +126,14 @@ class Vad(SystemModel):
 
     def _vectors(self, said: dict[str, Tensor]) -> Tensor:
         """(B, A, 1 + BOX) about 1 in size; boxes are not learnt from the plan."""
-        boxes = said["boxes"].detach()
-        there = said["presence"].detach().sigmoid()[..., None]
+        boxes = self.given(said["boxes"])
+        there = self.given(said["presence"]).sigmoid()[..., None]
         return torch.cat([there, boxes[..., :2] / METRES, boxes[..., 2:]], dim=2)
 
     def _polylines(self, said: dict[str, Tensor]) -> Tensor:
         """(B, L, MapKind + 2 * POINTS) likewise."""
-        kinds = said["kinds"].detach().softmax(dim=2)
-        return torch.cat([kinds, said["points"].detach().flatten(2) / METRES], dim=2)
+        kinds = self.given(said["kinds"]).softmax(dim=2)
+        return torch.cat([kinds, self.given(said["points"]).flatten(2) / METRES], dim=2)
 
     def loss(self, output: Output, labels: Labels) -> dict[str, Tensor]:
         return vad_losses(output, labels)
