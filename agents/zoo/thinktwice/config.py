@@ -36,7 +36,7 @@ class ThinkTwiceConfig(SystemConfig):
     channels: int = 32
     levels: tuple[int, ...] = (32, 40, 48, 48)
     token: int = 32
-    width: int = 96
+    width: int = 88
     rolled: int = 32
     layers: int = 2
     looks: int = 4
