@@ -73,7 +73,7 @@ def labels_of(
         waypoints=waypoints,
         valid=valid,
     )
-    found = {"waypoints": waypoints, "valid": valid}
+    found: dict[str, NDArray[Any]] = {"waypoints": waypoints, "valid": valid}
     found |= {name: LABELS[name](labelled) for name in config.labels}
     return {name: torch.from_numpy(value)[None] for name, value in found.items()}
 

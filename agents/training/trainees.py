@@ -36,7 +36,7 @@ from agents.training.samples import (
 )
 from agents.zoo.inputs import inputs_of
 from agents.zoo.registry import config_from, config_of, network_of, system_names
-from agents.zoo.system import SystemConfig, SystemModel
+from agents.zoo.system import Output, SystemConfig, SystemModel
 from agents.zoo.weights import holds_system, load_system, save_system
 from di_envs.config import check_name
 from di_envs.town.plan import RoutePlan
@@ -212,7 +212,8 @@ class SystemTrainee(Trainee):
         """
         assert isinstance(network, SystemModel)
         device = next(network.parameters()).device
-        mixed, output = training.precision == "bfloat16", None
+        mixed = training.precision == "bfloat16"
+        output: Output | None = None
         with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
             for moment in batch.inputs:
                 output = network(on_device(moment, device), output.state if output else None)

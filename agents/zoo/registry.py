@@ -62,9 +62,10 @@ def config_from(values: Any, source: str) -> SystemConfig:
 
 def network_of(config: SystemConfig) -> SystemModel:
     """Fresh weights, drawn from torch's generator."""
-    network: SystemModel = system_of(config.system).model(config)
+    network = system_of(config.system).model(config)
     # in which CPUs and GPUs convolve faster; torch's stubs do not know the argument
-    return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload,no-any-return]
+    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return network
 
 
 def recipe_of(name: str) -> str:

@@ -7,7 +7,7 @@ to the training loop, reads what it needs off these.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -191,6 +191,6 @@ class System:
     """
 
     configs: Mapping[str, SystemConfig]
-    model: type[Any]
+    model: Callable[[Any], SystemModel]
 
     FORMAT_VERSION: ClassVar[int] = 1  # of configurations and weights on disk

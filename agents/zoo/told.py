@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -19,7 +19,7 @@ from agents.zoo.system import Seen
 from di_envs.config import check_name
 from di_envs.prompt import SPEED_HISTORY
 
-_ENCODERS = {
+_ENCODERS: Mapping[str, Callable[[int], nn.Module]] = {
     "command": CommandEncoder,
     "target_point": TargetPointEncoder,
     "routing": RoutingEncoder,

@@ -45,6 +45,6 @@ def load_system(folder: Path) -> SystemModel:
 def holds_system(folder: Path) -> bool:
     """Whether a folder holds a system of the zoo, whole or not."""
     try:
-        return "system" in read_json(folder / CONFIG_FILE)
+        return bool("system" in read_json(folder / CONFIG_FILE))
     except JsonError:
         return False

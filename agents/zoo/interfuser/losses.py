@@ -27,16 +27,15 @@ def interfuser_losses(output: Output, labels: Labels, cells: int) -> dict[str, T
     error = (found[..., 1:] - rows[..., 1:]).abs()  # (B, cells², 7)
     traffic, asked = traffic_state(labels["signal"])
     wrong = F.binary_cross_entropy_with_logits(said["traffic"].float(), traffic, reduction="none")
-    wrong = _mean(wrong[:, 0], torch.ones_like(asked)), *(_mean(wrong[:, n], asked) for n in (1, 2))
     return {
         "waypoints": waypoint_error(output, labels, weights),
         # those that are there weigh as much as all that are empty
         "map": MAP * 0.5 * (_mean(presence, there) + _mean(presence, known * (1.0 - there))),
         "boxes": MAP * 0.1 * _mean(error[..., :6].sum(dim=2), there),
         "motion": MOTION * _mean(error[..., 6], there),
-        "line": LINE * wrong[0],
-        "light": LIGHT * wrong[1],
-        "stop": STOP * wrong[2],
+        "line": LINE * wrong[:, 0].mean(),
+        "light": LIGHT * _mean(wrong[:, 1], asked),
+        "stop": STOP * _mean(wrong[:, 2], asked),
     }
 
 

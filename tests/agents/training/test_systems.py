@@ -26,8 +26,10 @@ from tests.agents.training.small_policies import on_disk
 NAMES = system_names()
 MOST_PARAMETERS = 1_000_000  # two megabytes in float16
 BY_HEART = TrainConfig(
-    steps=60, batch=2, overfit=2, warm_up=5, learning_rate=3e-3, weight_decay=0.0
+    steps=30, batch=1, overfit=1, warm_up=5, learning_rate=3e-3, weight_decay=0.0
 )
+# What a system learns where it is not the waypoints of the expert: the points of its teacher
+LEARNT = {"lbc": "points"}
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +65,12 @@ def test_one_batch_is_learnt_by_heart(name, moments):
     training = Training.begin(config_named(name), BY_HEART, "cpu")
     batch = next(batches(Samples(config_named(name), BY_HEART, moments)))
     first = training.update(batch)
+    learning = [p for p in training.policy.parameters() if p.requires_grad]
+    assert all(parameter.grad is not None for parameter in learning)
     while training.step < BY_HEART.steps:
         last = training.update(batch)
-    assert first["waypoints"] > 0.5
-    assert last["waypoints"] < 0.15 * first["waypoints"], (first, last)
+    term = LEARNT.get(name, "waypoints")
+    assert last[term] < 0.15 * first[term], (first, last)
     assert last["total"] < 0.5 * first["total"], (first, last)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from agents import AgentSpecError
+from agents.zoo.ego_only.config import EgoOnlyConfig
 from agents.zoo.interfuser.losses import density_map, traffic_state
 from agents.zoo.lbc.points import (
     SpatialSoftmax,
@@ -14,9 +16,12 @@ from agents.zoo.lbc.points import (
     share_of_grid,
     share_of_image,
 )
+from agents.zoo.ppo.agent import PpoAgent
 from agents.zoo.raster import GRID
 from agents.zoo.registry import config_of, network_of
+from agents.zoo.roach_raster.config import RoachConfig
 from agents.zoo.system import FAMILY, SystemConfig
+from agents.zoo.transfuser.config import TransfuserConfig
 
 FRONT = FAMILY.cameras[0]
 
@@ -93,3 +98,17 @@ def test_a_students_teacher_stays_as_it_is():
 def test_a_system_that_asks_for_what_there_is_not_is_told_so(field, message):
     with pytest.raises(ValueError, match=message):
         SystemConfig(system="ego-only", **field)
+
+
+def test_sizes_that_do_not_go_together_are_refused():
+    with pytest.raises(ValueError, match="4 heads do not share a width of 10 evenly"):
+        TransfuserConfig(width=10)
+    with pytest.raises(ValueError, match="width must be from 1 to 4096, not 0"):
+        EgoOnlyConfig(width=0)
+    with pytest.raises(ValueError, match="widths must be from 1 to 4096, not -3"):
+        RoachConfig(widths=(16, -3))
+
+
+def test_ppo_without_its_model_says_how_to_make_one():
+    with pytest.raises(AgentSpecError, match=r"not trained yet: python examples/train_ppo\.py"):
+        PpoAgent(shipped="ppo")
