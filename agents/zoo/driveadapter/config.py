@@ -32,7 +32,7 @@ class DriveAdapterConfig(SystemConfig):
     image_width: int = 12
     channels: int = 32
     masks: tuple[int, ...] = (24, 32, 48)
-    raw: int = 32
+    raw: int = 28
     width: int = 96
     teacher: tuple[int, ...] = (16, 32, 48, 64, 96)
     teacher_width: int = 192
