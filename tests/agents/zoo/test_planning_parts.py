@@ -13,6 +13,8 @@ from agents.zoo.mile.model import balanced_kl
 from agents.zoo.raster import GRID
 from agents.zoo.registry import config_of, network_of
 from agents.zoo.st_p3.paths import ACCELERATIONS_MPS2, CURVATURES, path_costs, sampled_paths
+from agents.zoo.thinktwice.config import ThinkTwiceConfig
+from agents.zoo.thinktwice.thinking import Plan, ThinkingAgain
 from agents.zoo.two_heads import TwoHeads
 from agents.zoo.vad.losses import boundary, collision, matched
 from di_envs.town.map_chunks import MapKind
@@ -122,6 +124,15 @@ def test_a_teacher_inside_is_the_teacher_of_its_recipe_and_stays_as_it_is(name):
     assert not any(parameter.requires_grad for parameter in network.teacher.parameters())
     theirs, ours = network_of(config_of("roach-raster")).state_dict(), network.state_dict()
     assert all(ours[key].shape == value.shape for key, value in theirs.items())
+
+
+def test_who_thinks_again_has_nothing_to_mend_at_first():
+    config = ThinkTwiceConfig()
+    plan = Plan(waypoints=torch.rand(1, 4, 2), action=torch.zeros(1, 2))
+    ground = torch.rand(1, config.rolled, BEV.cells // 2, BEV.cells // 2)
+    thought = ThinkingAgain(config)(plan, torch.rand(1, config.width), ground)
+    assert not thought.offsets.waypoints.any()
+    assert thought.future.shape == (1, 4, *ground.shape[1:])
 
 
 def test_a_world_model_goes_on_without_looking():
