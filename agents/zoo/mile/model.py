@@ -111,12 +111,12 @@ class Mile(SystemModel):
             z = self._drawn(prior, posterior)
         else:
             posterior, z = prior, self._drawn(prior, prior)
-        state = torch.cat([h, z], dim=1)
-        policy = self.policy(state)
+        both = torch.cat([h, z], dim=1)
+        policy = self.policy(both)
         action = self.action(policy)
         said = {"prior": prior, "posterior": posterior}
         if self.training:
-            said["semantics"] = self.decode(state)
+            said["semantics"] = self.decode(both)
         return Output(
             waypoints=self.plan(policy),
             action=action,

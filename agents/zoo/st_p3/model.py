@@ -178,7 +178,7 @@ class StP3(SystemModel):
             "margin": MARGIN * self._margin(said, labels),
         }
 
-    def _margin(self, said: dict[str, Tensor] | Labels, labels: Labels) -> Tensor:
+    def _margin(self, said: Labels, labels: Labels) -> Tensor:
         """How far the truth is not cheaper than any path, by as much as that one is off [m]."""
         scene = Scene(now=said["now"], later=said["later"], cost=said["cost"])
         truth, valid = labels["waypoints"], labels["valid"]
