@@ -154,6 +154,17 @@ AGENTS: dict[str, AgentEntry] = {
         packages=("stable-baselines3", "torch"),
     ),
     "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
+    "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),
+    "mile": _system("mile", "mile:MileAgent", "a model of the world, which can imagine too"),
+    "st-p3": _system("st-p3", "st_p3:StP3Agent", "what comes as occupancy, and the cheapest path"),
+    "thinktwice": _system(
+        "thinktwice", "thinktwice:ThinkTwiceAgent", "a plan, mended by what comes if it is driven"
+    ),
+    "driveadapter": _system(
+        "driveadapter",
+        "driveadapter:DriveAdapterAgent",
+        "masks for a frozen teacher, with adapters",
+    ),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",
         summary="the same control for ever",

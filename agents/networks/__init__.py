@@ -15,5 +15,7 @@ fused.py       normalisation folded into convolutions, for who no longer learns
 raster_teacher.py  the true view from above to an action and waypoints
 waypoint_heads.py  vectors to waypoints
 weights.py     networks on disk, in float16
+looking.py     features of a map at places
+spatial_gru.py a GRU whose memory is a map
 unet.py        a map to one of the same size that has looked far
 """

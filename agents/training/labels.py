@@ -18,6 +18,7 @@ from torch import Tensor
 from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
+from agents.training.future import later_places, later_rasters
 from agents.training.truth import seen_truth
 from agents.training.waypoints import expert_waypoints
 from agents.zoo.raster import GRID, true_raster
@@ -121,6 +122,22 @@ def _signal(at: LabelledMoment) -> NDArray[np.float32]:
     return found[0] if len(found) else np.zeros(SIGNAL_COLUMNS, np.float32)
 
 
+def _map(at: LabelledMoment) -> NDArray[np.float32]:
+    """(M, POINTS, 4) x, y, `MapKind`, valid of the lines around, as the prompt has them."""
+    return np.asarray(at.observation["map"])
+
+
+def _motion(at: LabelledMoment) -> NDArray[np.float32]:
+    """(OBJECTS, T, 3) x, y, valid of those of `objects` at each waypoint's time."""
+    return later_places(at.drive, at.moment, at.stage.view, _objects(at), len(at.valid))
+
+
+def _future(at: LabelledMoment) -> NDArray[np.float16]:
+    """(T, C, X, Y) what `raster` will be at each waypoint's time, seen from here."""
+    routing = np.asarray(at.observation["routing"])
+    return later_rasters(at.drive, at.moment, at.stage.view, routing, len(at.valid))
+
+
 LABELS: Mapping[str, Callable[[LabelledMoment], NDArray[Any]]] = MappingProxyType(
     {
         "action": _action,
@@ -128,5 +145,8 @@ LABELS: Mapping[str, Callable[[LabelledMoment], NDArray[Any]]] = MappingProxyTyp
         "semantics": _semantics,
         "objects": _objects,
         "signal": _signal,
+        "map": _map,
+        "motion": _motion,
+        "future": _future,
     }
 )

@@ -120,8 +120,12 @@ class SystemAgent:
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
         with editing(self.network, tap_edits(self._edits, moment)):
-            output: Output = self.network(inputs_of(self.network.config, observation), state)
+            output: Output = self.network(self.seen(observation, memory), state)
         return output
+
+    def seen(self, observation: Observation, memory: SystemMemory) -> dict[str, Tensor]:
+        """What the network is shown: everything, unless a system shuts its eyes."""
+        return inputs_of(self.network.config, observation)
 
     def control(
         self, output: Output, observation: Observation, memory: SystemMemory

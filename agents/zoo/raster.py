@@ -23,7 +23,7 @@ from di_envs.world.world import WorldView
 
 GRID = GridConfig(x_min_m=-8.0, x_max_m=40.0, y_min_m=-24.0, y_max_m=24.0, cells=96)
 SPEED_MPS = 10.0  # velocities are told in these
-_ROUTE_HALF_M = 1.75  # to either side of the route that is drawn
+ROUTE_HALF_M = 1.75  # to either side of the route that is drawn
 _MOST = 250  # actors whose velocities are drawn: the nearest
 
 
@@ -75,7 +75,7 @@ def _blank() -> NDArray[np.uint8]:
 def _route(routing: NDArray[np.floating]) -> NDArray[np.uint8]:
     mask, ego, sides = _blank(), np.zeros(4), _sides()
     for x, y, yaw in routing[routing[:, 3] > 0.0, :3].tolist():
-        mark_box(Rectangle(x, y, yaw, 0.75, _ROUTE_HALF_M), ego, sides, 1, mask)
+        mark_box(Rectangle(x, y, yaw, 0.75, ROUTE_HALF_M), ego, sides, 1, mask)
     return mask
 
 

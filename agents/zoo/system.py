@@ -27,7 +27,7 @@ CONTROL_DT_S = 0.1
 MOMENT_DT_S = 0.5  # between the moments of a sequence, and between waypoints
 # The family of cameras that all systems see by: each names those that its paper has.
 FAMILY = RIGS["driveinsight"]
-LABELS = ("action", "raster", "semantics", "objects", "signal")
+LABELS = ("action", "raster", "semantics", "objects", "signal", "map", "motion", "future")
 
 Seen = Mapping[str, Tensor]  # what a system sees at a moment, (B, ...) each; see `inputs.inputs_of`
 Labels = Mapping[str, Tensor]  # what it is to say, (B, ...) each; see `training.labels`
@@ -160,6 +160,13 @@ class SystemModel(nn.Module, ABC):
             seen: What is seen at a moment.
             state: What the moment before it, `MOMENT_DT_S` ago, had it remember; None at first.
         """
+
+    def given(self, value: Tensor) -> Tensor:
+        """A value that what comes next is to take as it is: training stops its gradient there.
+
+        While it drives none is stopped, so that whoever explains it sees all that it rests on.
+        """
+        return value.detach() if self.training else value
 
     @abstractmethod
     def loss(self, output: Output, labels: Labels) -> dict[str, Tensor]:
