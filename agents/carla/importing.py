@@ -22,7 +22,7 @@ from agents.carla import data_provider
 from agents.carla.values import carla_values
 
 _OURS = ("di_envs", "agents", "leaderboard", "wrappers")  # loaded before, so found before others
-_STANDS_FOR = {
+_STANDS_FOR: dict[str, dict[str, Any]] = {
     "srunner.scenariomanager.carla_data_provider": {
         "CarlaDataProvider": data_provider.CarlaDataProvider
     },
@@ -97,7 +97,7 @@ def _stand_in() -> None:
             sys.modules[inner] = module
             if length > 1:
                 setattr(sys.modules[".".join(parts[: length - 1])], parts[length - 1], module)
-        vars(sys.modules[name]).update(contents)
+        sys.modules[name].__dict__.update(contents)
 
 
 def _say_environment(path: Path, config: str) -> None:

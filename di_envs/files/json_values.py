@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, Union
 
 from di_envs.files.names import name_hint
+from di_envs.files.plain_text import one_plain_line
 from di_envs.files.received import read_bytes
 
 T = TypeVar("T")
@@ -244,7 +245,7 @@ class _Reader:
         try:
             return kind(**given)
         except (ValueError, TypeError) as error:
-            raise _RefusedError(at, str(error)) from error
+            raise _RefusedError(at, one_plain_line(str(error))) from error
 
 
 def _is_number(value: Any) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 STEEPEST_DEG = 85.0  # north and south; beyond it Mercator's map is of no use
 
 
-def checked_origin(given: Sequence[float]) -> tuple[float, float]:
+def checked_origin(given: Sequence[float | str]) -> tuple[float, float]:
     """Latitude and longitude [deg] of an origin.
 
     Raises:

@@ -10,11 +10,10 @@ the teacher is `roach-raster`, whose view has velocities and whose action is a v
 
 from __future__ import annotations
 
-from typing import Self
-
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+from typing_extensions import Self
 
 from agents.driveinsight.rows import SPEED
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
@@ -47,8 +46,8 @@ class Adapter(nn.Module):
             conv_block(frozen + raw, frozen, size=1), SqueezeExcitation(frozen)
         )
         self.out = nn.Conv2d(frozen, frozen, 1)
-        nn.init.zeros_(self.out.weight)
-        nn.init.zeros_(self.out.bias)
+        for parameter in self.out.parameters():
+            nn.init.zeros_(parameter)
 
     def forward(self, frozen: Tensor, raw: Tensor) -> Tensor:
         """(B, C, X, Y) and (B, C', X, Y) to (B, C, X, Y)."""

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Self
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+from typing_extensions import Self
 
 from agents.driveinsight.rows import SPEED
 from agents.explain.protocol import Anatomy, TokenGroup
