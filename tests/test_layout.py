@@ -51,6 +51,7 @@ MODULES = sorted(path for package in ALLOWED for path in (TOP / package).rglob("
 ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za-z]:[\\/])")
 # Modules that ask the environment, and why they may
 ASKING = {
+    "agents/processes.py": "a child of ours is told by one to take no module of the working folder",
     "agents/carla/importing.py": "agents for CARLA read what its scripts say by them",
     "di_envs/files/caches.py": "who runs a container says by one where caches may be written",
     "di_envs/numerics/kernels.py": "Numba is told by one, before it loads, to keep bits equal",
