@@ -78,7 +78,7 @@ def test_overlaps_leave_out_what_is_ignored_and_are_told_for_near_cells_too():
     semantics[0, 60, 30:34] = int(BevClass.VEHICLE)  # 52.5 m ahead
     semantics[0, 21, 30] = IGNORED
     said = torch.zeros(1, len(BevClass), 64, 64)
-    said[0, int(BevClass.VEHICLE), 20:22, 30:32] = 1.0  # 2 are right, 1 wrong, 1 not asked
+    said[0, int(BevClass.VEHICLE), 20:22, 30:32] = 9.0  # 2 are right, 1 wrong, 1 not asked
     heads = SimpleNamespace(semantics=said)
     targets = PerceptionTargets(
         semantics=semantics, objects=torch.zeros(1, 0, 9), signal=torch.zeros(1, 8), lamps=None
