@@ -163,7 +163,7 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
         calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
     assert calls[-2] == with_origin(town.opendrive, (0.0, 0.0))  # the last call is destroy()
-    assert "lat_0=0.0" in calls[-2]
+    assert "+lat_0=0 +lon_0=0 " in calls[-2]
     with Driver(apart) as driver:
         again = driver.drive(Job(index=0, route_id="1", seed=0))
     assert again.fingerprint() == record.fingerprint()

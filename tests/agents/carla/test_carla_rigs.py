@@ -170,4 +170,5 @@ def test_the_maps_text_has_the_origin_by_which_gnss_counts():
     text = "<a><geoReference><![CDATA[+proj=tmerc +lat_0=49 +lon_0=8 +k=1]]></geoReference></a>"
     moved = with_origin(text, (0.0, -1.5))
     assert "+lat_0=0.0 +lon_0=-1.5 +k=1" in moved
+    assert with_origin(text, (49.0, 8.0)) == text
     assert with_origin("<a/>", (0.0, 0.0)) == "<a/>"
