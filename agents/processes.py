@@ -25,6 +25,7 @@ from itertools import islice
 from multiprocessing.connection import wait
 from typing import Any, Protocol, TypeVar
 
+from agents.import_folders import without_agents
 from di_envs.files.caches import CacheWarning
 
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE = 1, 4  # of Linux's prctl
@@ -135,14 +136,16 @@ def births() -> Iterator[None]:
 
     They never die of Ctrl-C, or Ctrl-\\, not even while they load; Windows has no such masks. And
     they load Python's own modules, not a `multiprocessing.py` of the working folder, which comes
-    first for a fresh process: it may be a folder that somebody sent.
+    first for a fresh process: it may be a folder that somebody sent. For the same reason they know
+    nothing of the folders of agents that were loaded here.
     """
     masks = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _FROM_TERMINAL) if masks else ()
     said = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
     try:
-        yield
+        with without_agents():
+            yield
     finally:
         os.environ.pop(_SAFE_PATH, None)
         if said is not None:

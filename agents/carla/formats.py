@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -150,15 +150,22 @@ def radar_points(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=4)
 def with_origin(opendrive: str, origin: tuple[float, float]) -> str:
-    """A map's text with another origin of its geoReference, so that it agrees with GNSS."""
+    """A map's text with another origin of its geoReference, so that it agrees with GNSS.
+
+    One that agrees already stays as it is, letter by letter.
+    """
 
     def moved_origin(found: re.Match[str]) -> str:
         text = found[0]
         for key, value in zip(("lat_0", "lon_0"), origin, strict=True):
-            text = re.sub(rf"{key}=[-+.\deE]+", f"{key}={value!r}", text)
+            text = re.sub(rf"{key}=([-+.\deE]+)", partial(_kept_or_put, key, value), text)
         return text
 
     return re.sub(r"<geoReference>.*?</geoReference>", moved_origin, opendrive, flags=re.DOTALL)
+
+
+def _kept_or_put(key: str, value: float, found: re.Match[str]) -> str:
+    return found[0] if float(found[1]) == value else f"{key}={value!r}"
 
 
 def semantic_points(

@@ -20,6 +20,7 @@ from typing import Any
 from agents import AgentSpecError, module_of_file
 from agents.carla import data_provider
 from agents.carla.values import carla_values
+from agents.import_folders import import_first
 
 _OURS = ("di_envs", "agents", "leaderboard", "wrappers")  # loaded before, so found before others
 _STANDS_FOR: dict[str, dict[str, Any]] = {
@@ -53,9 +54,7 @@ def entry_class(path: Path, config: str, folders: Sequence[Path]) -> type[Any]:
     spec = f"carla:{path}"
     for name in _OURS:
         importlib.import_module(name)
-    for folder in reversed([*map(str, map(Path.resolve, folders)), str(path.resolve().parent)]):
-        if folder not in sys.path:
-            sys.path.insert(0, folder)  # as CARLA's scripts do: agents import what lies beside them
+    import_first([*folders, path.parent])  # as CARLA's scripts do: agents import what lies beside
     _stand_in()
     _say_environment(path, config)
     try:

@@ -11,7 +11,6 @@ import contextlib
 import dataclasses
 import os
 import signal
-import sys
 from collections import deque
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.base import Requirements
+from agents.import_folders import path_without_agents
 from leaderboard.records.footing import record_differences
 from leaderboard.records.record import WORKER_DIED
 from leaderboard.running.jobs import Job, RunSpec, SetupError
@@ -181,7 +181,7 @@ def _is_path(value: Any) -> bool:
 
 def _own_cluster(workers: int) -> dict[str, Any]:
     """Options of a cluster of this machine, which finds the modules that are found here."""
-    modules = os.pathsep.join(str(Path(place).resolve()) for place in sys.path)
+    modules = os.pathsep.join(str(Path(place).resolve()) for place in path_without_agents())
     return {
         "num_cpus": workers,
         "include_dashboard": False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import sys
 import textwrap
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,6 +17,7 @@ from agents import AgentSpecError, load_agent
 from agents.base import Requirements, Track
 from agents.carla.agent import control_of
 from agents.carla.formats import with_origin
+from agents.processes import births
 from di_envs.route_env import RouteEnv
 from di_envs.suites import load_suite
 from leaderboard.records.record import AGENT_CRASHED, NOT_SET_UP, SENSORS_INVALID
@@ -161,7 +163,7 @@ def test_the_map_is_handed_to_agents_of_its_track(tmp_path):
         calls = load_agent(spec)._class.CALLS
     assert record.steps > 10
     assert calls[-2] == with_origin(town.opendrive, (0.0, 0.0))  # the last call is destroy()
-    assert "lat_0=0.0" in calls[-2]
+    assert "+lat_0=0 +lon_0=0 " in calls[-2]
     with Driver(apart) as driver:
         again = driver.drive(Job(index=0, route_id="1", seed=0))
     assert again.fingerprint() == record.fingerprint()
@@ -316,6 +318,11 @@ def test_folders_of_the_path_come_first_for_the_agents_imports_and_ours_before_t
     """
     spec = written(tmp_path, own) + f"?path={repo},{repo}/leaderboard"
     assert load_agent(spec)._class.THROTTLE == 0.5
+    before = list(sys.path)
+    assert before[:3] == [str(repo), str(repo / "leaderboard"), str(tmp_path)]
+    with births():  # a process that is born now is handed sys.path, and has to find ours
+        assert not [place for place in sys.path if place.startswith(str(tmp_path))]
+    assert sys.path == before
     with pytest.raises(AgentSpecError, match=r"path: there is no folder .*nowhere"):
         load_agent(written(tmp_path) + "?path=nowhere")
 
@@ -354,7 +361,7 @@ def test_the_constants_of_agents_for_0_9_10_give_the_next_target_to_a_decimetre(
     env = RouteEnv(**environment_options(QUIET, agent.requires))
     observation, _ = env.reset(seed=1)
     agent.act(observation, agent.start(env.plan, 1))
-    ((gps, targets),) = [call for call in agent._class.CALLS if isinstance(call[1], list)]
+    ((gps, targets),) = [call for call in agent._class.CALLS if isinstance(call[-1], list)]
     agent._class.CALLS.clear()
     place = np.array([targets[1]["lat"], targets[1]["lon"]])
     north, east = (place - gps[:2]) * CONSTANTS

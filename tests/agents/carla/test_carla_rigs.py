@@ -68,7 +68,7 @@ def test_depth_is_coded_in_three_bytes_and_read_back_by_carlas_formula(seen):
 def test_instances_have_the_tag_in_red_and_the_id_in_green_and_blue(seen):
     pixel = seen[1]["instance"][1][18, 30]
     assert pixel[2] == Tag.CAR
-    assert pixel[1] + 256 * pixel[0] == 2  # actor 1
+    assert int(pixel[1]) + 256 * int(pixel[0]) == 2  # actor 1
     image = instance_image(np.uint8([[14]]), np.int32([[0x1234]]))
     assert image.tolist() == [[[0x12, 0x34, 14, 255]]]
     assert semantic_image(np.uint8([[7]])).tolist() == [[[0, 0, 7, 255]]]
@@ -124,7 +124,8 @@ def test_an_obstacle_is_told_within_its_distance(seen):
 
 def touched(contacts=(), obstacle=(0.0, 0.0, 0.0), across=0):
     rows = np.zeros((8, 4), np.float32)
-    rows[: len(contacts)] = contacts
+    for row, contact in enumerate(contacts):
+        rows[row] = contact
     obstacle, across = np.float32(obstacle), np.uint8([across])
     return {"contacts": rows, "obstacle": obstacle, "across_line": across}
 
@@ -169,4 +170,5 @@ def test_the_maps_text_has_the_origin_by_which_gnss_counts():
     text = "<a><geoReference><![CDATA[+proj=tmerc +lat_0=49 +lon_0=8 +k=1]]></geoReference></a>"
     moved = with_origin(text, (0.0, -1.5))
     assert "+lat_0=0.0 +lon_0=-1.5 +k=1" in moved
+    assert with_origin(text, (49.0, 8.0)) == text
     assert with_origin("<a/>", (0.0, 0.0)) == "<a/>"
