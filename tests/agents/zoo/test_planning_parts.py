@@ -25,7 +25,7 @@ NEITHER = torch.tensor([[0.0, 0.0, 1.0]])
 
 def test_changes_of_lane_count_as_turns_and_no_command_as_neither():
     options = (RoadOption.LEFT, RoadOption.CHANGELANERIGHT, RoadOption.LANEFOLLOW, RoadOption.VOID)
-    chosen = command_of(torch.tensor([[int(option)] for option in options]))
+    chosen = command_of(torch.tensor([int(option) for option in options]))
     assert chosen.argmax(dim=1).tolist() == [0, 1, 2, 2]
     assert chosen.sum(dim=1).tolist() == [1.0] * 4
 
