@@ -113,7 +113,6 @@ print(moved(name, entry, drive(GOLDEN[name], recorded_controls(entry)), bits=Fal
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 1.1])
 def test_another_constant_of_the_idm_is_a_new_version_of_the_world(factor):
     """Uncompiled, as compiled code keeps the constant that it was made with."""
