@@ -14,19 +14,22 @@ import argparse
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 TOP = Path(__file__).resolve().parents[1]
 CLOCKS = ("wall_s", "duration_system")  # the only fields that may differ
-EXACT = (".npz", ".safetensors", ".csv", ".md")  # files that are compared as they are
+COLUMNS, ROWS = "drive_columns", "drives"  # of a study: their names, and a row for each drive
+TOLD_S = re.compile(r"\b[\d.]+ (s|min|h)\b")  # how long something took, in a page
+EXACT = (".npz", ".safetensors", ".csv")  # files that are compared as they are
 UNFINISHED = ".unfinished"  # what a name ends in that was being written
 
 
@@ -143,14 +146,24 @@ def contents(folder: Path) -> dict[str, Any]:
 
 def _said(path: Path) -> Any:
     if path.suffix == ".json":
-        return _without_clocks(json.loads(path.read_text("utf-8")))
+        said = json.loads(path.read_text("utf-8"))
+        columns = said.get(COLUMNS, []) if isinstance(said, dict) else []
+        return _without_clocks(said, [n for n, name in enumerate(columns) if name in CLOCKS])
+    if path.suffix == ".md":
+        return TOLD_S.sub("", path.read_text("utf-8"))
     return path.read_bytes() if path.suffix in EXACT else None
 
 
-def _without_clocks(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_clocks(item) for key, item in value.items() if key not in CLOCKS}
-    return [_without_clocks(item) for item in value] if isinstance(value, list) else value
+def _without_clocks(value: Any, places: Sequence[int] = ()) -> Any:
+    """A value without the clocks by name, and in the rows of drives those at these places."""
+    if not isinstance(value, dict):
+        return (
+            [_without_clocks(item, places) for item in value] if isinstance(value, list) else value
+        )
+    kept = {key: _without_clocks(item, places) for key, item in value.items() if key not in CLOCKS}
+    if places and ROWS in kept:
+        kept[ROWS] = [[x for n, x in enumerate(row) if n not in places] for row in kept[ROWS]]
+    return kept
 
 
 def main() -> int:
