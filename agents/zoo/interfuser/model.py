@@ -37,7 +37,7 @@ class ViewTokens(nn.Module):
     def __init__(self, inputs: int, places: int, width: int) -> None:
         super().__init__()
         self.project = nn.Conv2d(inputs, width, 1)
-        self.place = nn.Parameter(torch.randn(1, places + 1, width) * 0.02)  # and which view it is
+        self.place = nn.Parameter(torch.randn(1, places + 1, width) * 0.1)  # and which view it is
         self.tokens = Tap()
 
     def forward(self, features: Tensor) -> Tensor:
@@ -68,7 +68,7 @@ class Interfuser(SystemModel):
             MixingLayer(width, config.heads) for _ in range(config.encoder_layers)
         )
         queries = config.cells**2 + 1 + config.waypoints
-        self.query = nn.Parameter(torch.randn(1, queries, width) * 0.02)
+        self.query = nn.Parameter(torch.randn(1, queries, width) * 0.5)
         self.decoder = nn.ModuleList(
             DecoderLayer(width, config.heads) for _ in range(config.decoder_layers)
         )
