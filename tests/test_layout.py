@@ -51,7 +51,6 @@ MODULES = sorted(path for package in ALLOWED for path in (TOP / package).rglob("
 ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za-z]:[\\/])")
 # Modules that ask the environment, and why they may
 ASKING = {
-    "agents/processes.py": "a child of ours is told by one to take no module of the working folder",
     "agents/carla/importing.py": "agents for CARLA read what its scripts say by them",
     "agents/processes.py": "Python is told by one to look for no module in the working folder",
     "di_envs/files/caches.py": "who runs a container says by one where caches may be written",
