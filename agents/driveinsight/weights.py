@@ -55,7 +55,7 @@ def read_config(folder: Path) -> PolicyConfig:
     try:
         return PolicyConfig.from_mapping(content, str(folder / CONFIG_FILE))
     except JsonError as error:
-        raise WeightsError(f"{error}: give a folder that save_pretrained wrote") from error
+        raise WeightsError(f"{error}: give a folder that `driveinsight train` wrote") from error
 
 
 def take_weights(policy: Policy, folder: Path, *, only: str = "") -> tuple[list[str], list[str]]:

@@ -70,7 +70,7 @@ def read_content(folder: Path, version: int) -> dict[str, Any]:
     try:
         content = read_json(path)
     except JsonError as error:
-        raise WeightsError(f"{error}: give a folder that save_pretrained wrote") from error
+        raise WeightsError(f"{error}: give a folder that `driveinsight train` wrote") from error
     found = content.pop("format_version", None) if isinstance(content, dict) else None
     if found != version:
         raise WeightsError(
@@ -93,7 +93,7 @@ def load_strictly(network: nn.Module, folder: Path, name: str) -> None:
     """
     path = folder / WEIGHTS_FILE
     if not path.is_file():
-        raise WeightsError(f"there is no {path}: give a folder that save_pretrained wrote")
+        raise WeightsError(f"there is no {path}: give a folder that `driveinsight train` wrote")
     try:
         weights = safetensors.torch.load_file(path)
     except (SafetensorError, OSError) as error:
@@ -118,7 +118,7 @@ def weights_digest(folder: Path) -> str:
     """
     path = folder / WEIGHTS_FILE
     if not path.is_file():
-        raise WeightsError(f"there is no {path}: give a folder that save_pretrained wrote")
+        raise WeightsError(f"there is no {path}: give a folder that `driveinsight train` wrote")
     return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
 
 

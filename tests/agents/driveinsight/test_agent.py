@@ -113,5 +113,5 @@ def test_the_folder_may_be_named_as_an_option_too(folder):
 
 
 def test_a_folder_without_a_policy_is_refused_with_what_to_do(tmp_path):
-    with pytest.raises(AgentSpecError, match="save_pretrained"):
+    with pytest.raises(AgentSpecError, match="that `driveinsight train` wrote"):
         load_agent(f"driveinsight:{tmp_path}")

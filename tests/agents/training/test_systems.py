@@ -28,13 +28,30 @@ MOST_PARAMETERS = 1_000_000  # two megabytes in float16
 BY_HEART = TrainConfig(
     steps=30, batch=1, overfit=1, warm_up=5, learning_rate=3e-3, weight_decay=0.0
 )
-# What a system learns where it is not the waypoints of the expert: the points of its teacher
-LEARNT = {"lbc": "points"}
+PAST = 1  # moments before it: more are more of the same
+STEPS = {"mile": 60}  # of those that draw what they believe
+# What falls far, but for the waypoints of the expert; a student has the points of its teacher
+LEARNT = {
+    "roach-raster": ("waypoints", "action"),
+    "interfuser": ("waypoints", "map", "boxes", "line", "light"),
+    "lbc-teacher": ("waypoints", "action"),
+    "lbc": ("points",),
+    "vad": ("waypoints", "ways", "kinds"),
+    "mile": ("waypoints", "action"),
+    "st-p3": ("waypoints", "margin"),
+    "thinktwice": ("waypoints", "earlier", "action", "speed"),
+    "driveadapter": ("waypoints", "action", "features"),
+}
+TURNING = (1, 229)  # drive and moment: it turns at a light, with others around and one ahead
 
 
 @pytest.fixture(scope="module")
 def moments(drives):
-    return load_moments([drives], standing_share=0.3)
+    """One moment, of which every system has something to say."""
+    every = load_moments([drives], standing_share=0.3)
+    row = (every.drive == TURNING[0]) & (every.moment == TURNING[1])
+    assert row.sum() == 1
+    return dataclasses.replace(every, drive=every.drive[row], moment=every.moment[row])
 
 
 @pytest.fixture(scope="module")
@@ -62,16 +79,19 @@ def untrained(tmp_path, request):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_one_batch_is_learnt_by_heart(name, moments):
-    training = Training.begin(config_named(name), BY_HEART, "cpu")
-    batch = next(batches(Samples(config_named(name), BY_HEART, moments)))
+    config = config_named(name)
+    config = dataclasses.replace(config, past=min(config.past, PAST))
+    by_heart = dataclasses.replace(BY_HEART, steps=STEPS.get(name, BY_HEART.steps))
+    training = Training.begin(config, by_heart, "cpu")
+    batch = next(batches(Samples(config, by_heart, moments)))
     first = training.update(batch)
     learning = [p for p in training.policy.parameters() if p.requires_grad]
     assert all(parameter.grad is not None for parameter in learning)
-    while training.step < BY_HEART.steps:
+    while training.step < by_heart.steps:
         last = training.update(batch)
-    term = LEARNT.get(name, "waypoints")
-    assert last[term] < 0.15 * first[term], (first, last)
-    assert last["total"] < 0.5 * first["total"], (first, last)
+    for term in LEARNT.get(name, ("waypoints",)):
+        assert last[term] < 0.5 * first[term], (term, first, last)
+    assert last["total"] < 0.25 * first["total"], (first, last)
 
 
 @pytest.mark.parametrize("untrained", NAMES, indirect=True)

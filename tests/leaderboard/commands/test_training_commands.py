@@ -102,14 +102,17 @@ def test_a_policys_version_changes_with_its_weights_and_not_with_its_card(policy
     [
         (["train", "--config", "tinny"], "did you mean 'tiny'"),
         (["train", "--data", "nowhere", "--config", "tiny"], "run `driveinsight collect` first"),
-        (["train", "--init-from", "nowhere"], "give a folder that save_pretrained wrote"),
+        (["train", "--init-from", "nowhere"], "give a folder that `driveinsight train` wrote"),
         (["train", "--steps", "0"], "steps must be at least 1"),
         (["train", "--check-every", "0"], "--check-every must be at least 1"),
         (["collect", "--towns", "suburbs"], "did you mean 'suburb'"),
         (["collect", "--frames", "0"], "must be at least 1"),
         (["export", "--data", "nowhere"], "run `driveinsight collect` first"),
         (["export", "--cameras", "smal"], "did you mean 'small'"),
-        (["evaluate", "--agent", "driveinsight:nowhere", "--suite", "toy"], "save_pretrained"),
+        (
+            ["evaluate", "--agent", "driveinsight:nowhere", "--suite", "toy"],
+            "that `driveinsight train` wrote",
+        ),
     ],
 )
 def test_a_wrong_request_says_what_to_do(arguments, told, capsys, tmp_path, monkeypatch):
