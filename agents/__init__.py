@@ -177,6 +177,9 @@ AGENTS: dict[str, AgentEntry] = {
     ),
 }
 
+# Packages that not everybody has, and the extra that brings each
+_EXTRAS = {"torch": "policy", "safetensors": "policy", "stable_baselines3": "rl"}
+
 # What stands before a colon: how the file that follows it is driven. A module of such a name can
 # still be reached by a longer one, or by its file.
 SCHEMES: dict[str, AgentEntry] = {
@@ -247,7 +250,7 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
     name, said = named(spec)
     if name in AGENTS:
         entry = AGENTS[name]
-        return _make(spec, entry.entry_point, {**entry.options, **said, **options})
+        return _ours(spec, entry, {**entry.options, **said, **options})
     scheme, _, place = spec.partition(":")
     if scheme in SCHEMES:
         entry = SCHEMES[scheme]
@@ -257,7 +260,7 @@ def load_agent(spec: str, **options: Any) -> Agent[Any]:
                 f"agent '{spec}': the {entry.argument} stands before the '?', not behind it."
             )
         given = {entry.argument: path, **said, **options}
-        return _make(spec, entry.entry_point, {**entry.options, **given})
+        return _ours(spec, entry, {**entry.options, **given})
     if ":" not in spec:
         raise AgentSpecError(_unknown_name(name))
     return _make(spec, spec, options)
@@ -291,6 +294,19 @@ def place_and_options(spec: str, place: str) -> tuple[str, dict[str, str]]:
                 f"'{query}'."
             )
     return path, options
+
+
+def _ours(spec: str, entry: AgentEntry, options: Mapping[str, Any]) -> Agent[Any]:
+    """An agent of the tables; says which extra brings a package that it lacks."""
+    try:
+        return _make(spec, entry.entry_point, options)
+    except ModuleNotFoundError as error:
+        if error.name not in _EXTRAS:
+            raise
+        raise AgentSpecError(
+            f"agent '{spec}' needs {error.name}, which is not installed: pip install "
+            f"'driveinsight[{_EXTRAS[error.name]}]'."
+        ) from error
 
 
 def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]:

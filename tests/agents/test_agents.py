@@ -16,6 +16,8 @@ from agents.constant import ConstantAgent
 from agents.random import RandomAgent
 from di_envs.town.plan import RoutePlan
 
+TOP = Path(__file__).resolve().parents[2]
+
 
 @pytest.fixture
 def plan() -> RoutePlan:
@@ -137,3 +139,19 @@ def test_the_random_agent_is_a_function_of_seed_and_decision(plan: RoutePlan):
     assert first != drive(RandomAgent(), 8)
     assert first[0] == first[9] != first[10]
     assert all(throttle == 0.0 or brake == 0.0 for throttle, _, brake in first)
+
+
+@pytest.mark.parametrize("name", ["driveinsight", "ego-only"])
+def test_who_lacks_torch_is_told_which_extra_brings_it(name):
+    code = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from agents import AgentSpecError, load_agent\n"
+        f"try: load_agent({name!r})\n"
+        "except AgentSpecError as error: print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=TOP
+    )
+    assert done.stdout.strip() == (
+        f"agent '{name}' needs torch, which is not installed: pip install 'driveinsight[policy]'."
+    )
