@@ -96,6 +96,7 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
     assert record.score.route_completion > 5.0  # it is made to drive off from the start
 
 
+@pytest.mark.full
 def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     pytest.importorskip("torch", reason="needs the extra policy")
     recipe, small = tmp_path / "tiny.toml", {"steps": "2", "frames": "20"}
