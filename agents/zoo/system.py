@@ -182,6 +182,18 @@ class SystemModel(nn.Module, ABC):
         """Its token groups, attention and maps, for `agents.explain`."""
 
 
+class TaughtModel(SystemModel):
+    """One with a teacher inside that no longer learns: its norms stay as they are, too."""
+
+    teacher: nn.Module
+
+    def train(self, mode: bool = True) -> Self:
+        """It learns; the teacher stays as it is."""
+        super().train(mode)
+        self.teacher.eval()
+        return self
+
+
 @dataclass(frozen=True, kw_only=True)
 class System:
     """A folder of the zoo.

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from leaderboard.pages.markup import Content, Markup, element
 
 
-class Shown:
+class Shown(ABC):
     """Something with a title and a table of rows."""
 
     @property
+    @abstractmethod
     def title(self) -> str:
         """What it is, in a line."""
-        raise NotImplementedError
 
+    @abstractmethod
     def rows(self) -> list[dict[str, Any]]:
         """Its table: a dictionary for each row, all with the same names."""
-        raise NotImplementedError
 
     def to_dataframe(self) -> Any:
         """Its table as a data frame of pandas.

@@ -13,7 +13,6 @@ from __future__ import annotations
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
-from typing_extensions import Self
 
 from agents.driveinsight.rows import SPEED
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
@@ -26,7 +25,7 @@ from agents.zoo.driveadapter.masks import MaskHead, drawn_route, mask_losses
 from agents.zoo.errors import waypoint_error
 from agents.zoo.eyes import EXTENT_M, BevEyes, Recall
 from agents.zoo.raster import GRID, RasterChannel
-from agents.zoo.system import Labels, Output, Seen, State, SystemModel
+from agents.zoo.system import Labels, Output, Seen, State, TaughtModel
 
 # As published, relative to the waypoints' 10
 FEATURES = (2.0, 1.0, 0.5, 0.2, 0.1)
@@ -54,8 +53,10 @@ class Adapter(nn.Module):
         return frozen + self.out(self.mix(torch.cat([frozen, raw], dim=1)))
 
 
-class DriveAdapter(SystemModel):
+class DriveAdapter(TaughtModel):
     """The network, with the teacher that acts inside it and no longer learns."""
+
+    teacher: RasterTeacher
 
     def __init__(self, config: DriveAdapterConfig) -> None:
         super().__init__()
@@ -78,12 +79,6 @@ class DriveAdapter(SystemModel):
         side = -(-GRID.cells // 2 ** len(widths))
         self.join = nn.Sequential(nn.Linear(raw * side * side + width, config.width), nn.ReLU())
         self.plan = StepsHead(config.width, config.waypoints)
-
-    def train(self, mode: bool = True) -> Self:
-        """It learns; the teacher stays as it is."""
-        super().train(mode)
-        self.teacher.eval()
-        return self
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         bev, _ = self.eyes(seen)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
-from typing_extensions import Self
 
 from agents.driveinsight.rows import METRES
 from agents.explain.protocol import Anatomy, FeatureMap, TokenGroup
@@ -30,7 +29,7 @@ from agents.zoo.lbc.points import (
     share_of_image,
 )
 from agents.zoo.raster import GRID, RasterChannel
-from agents.zoo.system import FAMILY, Labels, Output, Seen, State, SystemModel
+from agents.zoo.system import FAMILY, Labels, Output, Seen, State, SystemModel, TaughtModel
 
 STRIDE = 4  # pixels to a cell of the student's heatmaps
 MAP_RADIUS, IMAGE_RADIUS = 3.0, 2.0  # of the target that is drawn, in cells
@@ -122,7 +121,7 @@ class LbcTeacher(SystemModel):
         )
 
 
-class LbcStudent(SystemModel):
+class LbcStudent(TaughtModel):
     """The one with cameras, and the teacher that it learns from, who no longer learns."""
 
     def __init__(self, config: LbcConfig) -> None:
@@ -131,12 +130,6 @@ class LbcStudent(SystemModel):
         self.teacher = Teacher(config).requires_grad_(False)
         self.student = Student(config)
         self.target = Tap()
-
-    def train(self, mode: bool = True) -> Self:
-        """The student learns; the teacher stays as it is, its norms too."""
-        super().train(mode)
-        self.teacher.eval()
-        return self
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         size = (_FRONT.height, _FRONT.width)

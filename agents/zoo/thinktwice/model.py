@@ -16,7 +16,6 @@ from itertools import pairwise
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
-from typing_extensions import Self
 
 from agents.driveinsight.rows import SPEED
 from agents.explain.protocol import Anatomy, TokenGroup
@@ -27,7 +26,7 @@ from agents.networks.waypoint_heads import StepsHead
 from agents.zoo.errors import action_error, waypoint_error
 from agents.zoo.eyes import BEV, BevEyes, Recall
 from agents.zoo.raster import GRID, RasterChannel
-from agents.zoo.system import Labels, Output, Seen, State, SystemModel
+from agents.zoo.system import Labels, Output, Seen, State, TaughtModel
 from agents.zoo.thinktwice.config import ThinkTwiceConfig
 from agents.zoo.thinktwice.thinking import Plan, ThinkingAgain, Thought
 from agents.zoo.told import ToldEncoder
@@ -59,7 +58,7 @@ class Pyramid(nn.Module):
         return maps, self.flat(self.last(bev).flatten(1))
 
 
-class ThinkTwice(SystemModel):
+class ThinkTwice(TaughtModel):
     """The network, and the teacher that it learns features from, who no longer learns."""
 
     def __init__(self, config: ThinkTwiceConfig) -> None:
@@ -74,7 +73,9 @@ class ThinkTwice(SystemModel):
         self.pyramid = Pyramid(config)
         self.as_teacher = nn.ModuleList(
             nn.Conv2d(ours, theirs, 1)
-            for ours, theirs in zip(config.levels, config.teacher, strict=False)
+            for ours, theirs in zip(
+                config.levels, config.teacher[: len(config.levels)], strict=True
+            )
         )
         self.latent = nn.Linear(width, config.teacher_width)
         self.speed = nn.Linear(width, 1)
@@ -84,12 +85,6 @@ class ThinkTwice(SystemModel):
         self.ground = nn.Conv2d(config.levels[_ROLLED], config.rolled, 1)
         self.again = nn.ModuleList(ThinkingAgain(config) for _ in range(config.layers))
         self.future = nn.Conv2d(config.rolled, config.teacher[_ROLLED], 1)
-
-    def train(self, mode: bool = True) -> Self:
-        """It learns; the teacher stays as it is."""
-        super().train(mode)
-        self.teacher.eval()
-        return self
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         bev, _ = self.eyes(seen)
