@@ -1,8 +1,9 @@
 """Which moments ask for more than to follow the road: those a planner is shown more often.
 
 In drives of an expert they are rare: at one moment in fifty somebody on foot is near the way ahead,
-or the ego rolls towards a red light. How often a moment is drawn depends on what is there, not on
-what the expert then does, so what is learnt to follow from it stays what follows from it.
+or the ego comes to a red light; at one in a hundred it waits there. How often a moment is drawn
+depends on what is there, not on what the expert then does, so what is learnt to follow from it
+stays what follows from it.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     """By name of `INTEREST`: (M,) whether there is such a thing near the way ahead.
 
     `people`: on foot or a bicycle, within 20 m along the way and 6 m beside it. `light`: of the
-    ego's lane within 40 m, not green, while it moves. `sign`: of its lane within 15 m. `crossing`:
-    a vehicle within 30 m that moves across the way at 3 m/s or more.
+    ego's lane within 40 m, not green, whether it rolls or waits. `sign`: of its lane within 15 m.
+    `crossing`: a vehicle within 30 m that moves across the way at 3 m/s or more.
     """
     kind, there = rows["obstacles"][..., 7], rows["obstacles"][..., 8] > 0.0
     people = np.isin(kind, _ON_FOOT_OR_TWO_WHEELS)
@@ -61,7 +62,7 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     light = (stopping & (_line_m(rows, "traffic_lights") < 40.0)).any(axis=1)
     return {
         "people": (there & people & near).any(axis=1),
-        "light": light & (rows["speed"][:, 0] > 0.5),
+        "light": light,
         "sign": (_line_m(rows, "stop_signs") < 15.0).any(axis=1),
         "crossing": (there & ~people & crosses).any(axis=1),
     }

@@ -40,7 +40,7 @@ def somebody(kind, x, y, vx=0.0, vy=0.0):
         ({"obstacles": somebody(ActorKind.CAR, 20, 10, vy=-6)}, {"crossing"}),
         ({"obstacles": somebody(ActorKind.CAR, 20, 0, vx=9)}, set()),
         ({"traffic_lights": (25, 0, 0, RED, 1)}, {"light"}),
-        ({"traffic_lights": (25, 0, 0, RED, 1), "speed_mps": 0.0}, set()),
+        ({"traffic_lights": (3, 0, 0, RED, 1), "speed_mps": 0.0}, {"light"}),
         ({"traffic_lights": (25, 0, 0, GREEN, 1)}, set()),
         ({"traffic_lights": (25, -3.5, 0, RED, 1)}, set()),
         ({"traffic_lights": (25, 0, np.pi, RED, 1)}, set()),
