@@ -22,6 +22,7 @@ PLANNING: Mapping[str, Any] = MappingProxyType(
     {
         "rendered": False,
         "interest": dict(INTEREST),
+        "mistold": 0.4,
         "measured_moments": 512,
         "measured_every": 500,
         "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
@@ -60,6 +61,8 @@ class TrainConfig:
         eyes: How bad the eyes are that see it.
         interest: By what there is near the way, how much more often a planner that learns alone is
             shown a moment; see `interest.reasons`.
+        mistold: Share of the samples of a planner that learns alone that are told wrong speeds; see
+            `planning.told_speeds`.
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
@@ -87,6 +90,7 @@ class TrainConfig:
     rendered: bool = True
     eyes: EyeConfig = field(default_factory=EyeConfig)
     interest: Mapping[str, float] = field(default_factory=dict)
+    mistold: float = 0.0
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""

@@ -27,11 +27,13 @@ from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
 from agents.training.variation import Variation
-from di_envs.numerics.keyed_arrays import keyed_uniforms, stream_of
+from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.prompt import POSITION_LIMIT_M
 
 _ROWS, _ASIDE = stream_of("moments of a batch"), stream_of("moments set aside")
+_MISTOLD, _OFF = stream_of("speeds that are told wrong"), stream_of("how far off speeds are told")
+_OFF_MPS = 1.0  # standard deviation of a speed that is told wrong
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +90,8 @@ class PlanningSamples:
         rows = self.taught[place.clip(max=len(self.taught) - 1)]
         right_m, turn_rad = set_aside(training.varied, training.batch, key)
         eyes = NO_NOISE if training.overfit else training.eyes
-        return self._batch(rows, right_m, turn_rad, eyes, key, share)
+        mistold = 0.0 if training.overfit else training.mistold
+        return self._batch(rows, right_m, turn_rad, eyes, key, share, mistold)
 
     def measured(self, number: int, share: slice) -> Batch:
         """The moments that it is measured on, one batch after the other: nothing is varied."""
@@ -114,6 +117,7 @@ class PlanningSamples:
         eyes: EyeConfig,
         key: int,
         share: slice,
+        mistold: float = 0.0,
     ) -> Batch:
         moments = self.cache.rows[rows]
         moved = _Moved(right_m, turn_rad)
@@ -125,8 +129,9 @@ class PlanningSamples:
             own = moved.rows(_whole(seen["objects"]), velocity=True)
             objects = np.where(looked, own, objects)
             signals = np.where(looked, moved.rows(_whole(seen["signals"])), signals)
+        prompt = _prompt(moments, moved) | told_speeds(moments, mistold, key)
         inputs = Inputs(
-            prompt={name: _tensor(value[share]) for name, value in _prompt(moments, moved).items()},
+            prompt={name: _tensor(value[share]) for name, value in prompt.items()},
             present=torch.ones(share.stop - share.start, len(TOKENS)),
             seen=Seen(objects=_tensor(objects[share]), signals=_tensor(signals[share])),
         )
@@ -147,6 +152,23 @@ def set_aside(
     varied = draws[:, 0] < variation.share
     aside, turn = (2.0 * draws[:, n] - 1.0 for n in (1, 2))
     return varied * aside * variation.aside_m, varied * turn * variation.turn_rad
+
+
+def told_speeds(
+    moments: NDArray[np.void], mistold: float, key: int
+) -> dict[str, NDArray[np.float32]]:
+    """The speeds, present (B, 1) and past (B, K), of which a share of samples is told wrong ones.
+
+    What is then right is what the scene asks for, and not to go on as one went: who has rolled for
+    a moment at a red light is else taken for one who starts (de Haan et al., Causal Confusion in
+    Imitation Learning, NeurIPS 2019).
+    """
+    speeds = np.concatenate([moments["speed"], moments["speed_history"]], axis=1)
+    wrong = keyed_uniforms(key, _MISTOLD, 0, (len(speeds), 1)) < mistold
+    off = wrong * _OFF_MPS * keyed_normals(key, _OFF, 0, speeds.shape)
+    told = (speeds + off).clip(min=0.0).astype(np.float32)
+    now = moments["speed"].shape[1]
+    return {"speed": told[:, :now], "speed_history": told[:, now:]}
 
 
 class _Moved:
@@ -188,7 +210,7 @@ def _beside(values: NDArray[np.float32], rows: NDArray[np.float32]) -> NDArray[n
 
 
 def _prompt(moments: NDArray[np.void], moved: _Moved) -> dict[str, NDArray[Any]]:
-    """The prompt's components, as an observation has them, (B, ...) each."""
+    """The prompt's components but the speeds, as an observation has them, (B, ...) each."""
     kinds = moments["map_kinds"][..., None].astype(np.float32)
     there = (kinds > 0.0).astype(np.float32)
     places = moved.places(_whole(moments["map_places"])) * there
@@ -203,8 +225,6 @@ def _prompt(moments: NDArray[np.void], moved: _Moved) -> dict[str, NDArray[Any]]
         "obstacles": moved.rows(_whole(moments["obstacles"]), velocity=True),
         "traffic_lights": moved.rows(_whole(moments["traffic_lights"])),
         "stop_signs": moved.rows(_whole(moments["stop_signs"])),
-        "speed": moments["speed"],
-        "speed_history": moments["speed_history"],
     }
 
 

@@ -16,7 +16,7 @@ from agents.training.learning import Training
 from agents.training.loading import load_moments, town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
-from agents.training.planning import PlanningSamples, set_aside
+from agents.training.planning import PlanningSamples, set_aside, told_speeds
 from agents.training.variation import Variation
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
@@ -175,3 +175,17 @@ def test_nobody_is_set_aside_further_than_asked_and_a_share_of_them_not_at_all()
     assert np.abs(right_m).max() <= 1.0
     assert np.abs(turn_rad).max() <= 0.2
     assert (right_m == 0.0).mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_share_of_samples_is_told_wrong_speeds_each_off_by_itself_and_none_below_zero():
+    moments = np.zeros(2000, MOMENT)
+    moments["speed"], moments["speed_history"] = 10.0, 10.0
+    told = told_speeds(moments, 0.4, key=3)
+    now, past = told["speed"][:, 0] - 10.0, told["speed_history"][:, 0] - 10.0
+    off = now != 0.0
+    assert off.mean() == pytest.approx(0.4, abs=0.04)
+    assert np.array_equal(off, past != 0.0)
+    assert now[off].std() == pytest.approx(1.0, abs=0.1)
+    assert abs(np.corrcoef(now[off], past[off])[0, 1]) < 0.1
+    assert told_speeds(np.zeros(2000, MOMENT), 1.0, key=3)["speed"].min() == 0.0
+    assert np.array_equal(told_speeds(moments, 0.0, key=3)["speed"], moments["speed"])
