@@ -59,16 +59,16 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     ahead = (station_m > 0.0) & (station_m < 30.0) & (aside_m < 15.0)
     crosses = ahead & (np.abs(seen.across_mps.numpy()) > 3.0)
     stopping = rows["traffic_lights"][..., 3] >= LightState.YELLOW
-    light = (stopping & (_line_m(rows, "traffic_lights") < 40.0)).any(axis=1)
+    light = (stopping & (line_m(rows, "traffic_lights") < 40.0)).any(axis=1)
     return {
         "people": (there & people & near).any(axis=1),
         "light": light,
-        "sign": (_line_m(rows, "stop_signs") < 15.0).any(axis=1),
+        "sign": (line_m(rows, "stop_signs") < 15.0).any(axis=1),
         "crossing": (there & ~people & crosses).any(axis=1),
     }
 
 
-def _line_m(rows: NDArray[np.void], name: str) -> NDArray[np.float32]:
+def line_m(rows: NDArray[np.void], name: str) -> NDArray[np.float32]:
     """(M, K) how far ahead each stop line of the ego's own lane is [m]; infinite for others."""
     seen = _on_route(rows, name)
     aside_m, station_m = np.abs(seen.aside_m.numpy()), seen.station_m.numpy()

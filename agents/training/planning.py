@@ -22,6 +22,7 @@ from agents.driveinsight.seen import Seen
 from agents.training.caching import MomentCache
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team
+from agents.training.foreseen import foreseen
 from agents.training.interest import draw_weights
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
@@ -46,6 +47,7 @@ class PlanningSamples:
         cache: Where moments come from.
         taught: Rows of the cache that are learnt from.
         kept_out: Rows that are measured on, in their order.
+        valid: (M, T) which waypoints of the cache are learnt; see `foreseen`.
         drawn: (T,) how often each of these and all before it are drawn together, up to 1.
         own: What the policy's own eyes have seen at these moments; None where none has looked.
     """
@@ -55,6 +57,7 @@ class PlanningSamples:
     cache: MomentCache
     taught: NDArray[np.int64]
     kept_out: NDArray[np.int64]
+    valid: NDArray[np.bool_]
     drawn: NDArray[np.float64]
     own: OwnEyes | None = None
 
@@ -77,6 +80,7 @@ class PlanningSamples:
             cache=cache,
             taught=taught,
             kept_out=_spread(kept_out, training.measured),
+            valid=foreseen(cache.rows) & (cache.rows["valid"] > 0),
             drawn=np.cumsum(weights) / weights.sum(),
             own=own,
         )
@@ -135,10 +139,9 @@ class PlanningSamples:
             present=torch.ones(share.stop - share.start, len(TOKENS)),
             seen=Seen(objects=_tensor(objects[share]), signals=_tensor(signals[share])),
         )
-        waypoints = moved.places(moments["waypoints"]) * moments["valid"][..., None]
-        targets = Targets(
-            waypoints=_tensor(waypoints[share]), valid=_tensor(_whole(moments["valid"])[share])
-        )
+        valid = _whole(self.valid[rows])
+        waypoints = moved.places(moments["waypoints"]) * valid[..., None]
+        targets = Targets(waypoints=_tensor(waypoints[share]), valid=_tensor(valid[share]))
         return Batch(
             inputs=(inputs,), targets=targets, begun=torch.ones(1, share.stop - share.start)
         )
