@@ -214,6 +214,12 @@ SCHEMES: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "human": AgentEntry(
+        entry_point="agents.human.agent:HumanAgent",
+        summary="human:keyboard, human:gamepad: a person, in the window of `driveinsight play`",
+        version=1,
+        argument="by",
+    ),
     "pickled": AgentEntry(
         entry_point="agents.pickled:PickledAgent",
         summary="pickled:FILE.pickle: a class or an instance that `leaderboard.evaluate` was given",
