@@ -25,9 +25,16 @@ def code_of_others(spec: str) -> str:
         return ""
     if scheme in PICKLES:
         return f"the pickles in {_file_of(place)}"
+    if scheme == "llm":
+        return code_at(module_named(place))
     if scheme in SCHEMES:
         return f"the file {_file_of(place)}{_beside(place)}"
     return code_at(spec.rpartition(":")[0])
+
+
+def module_named(place: str) -> str:
+    """The module, or the Python file, of `module:function?option=value`."""
+    return place.partition("?")[0].rpartition(":")[0]
 
 
 def code_at(place: str) -> str:

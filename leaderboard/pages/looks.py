@@ -14,6 +14,7 @@ _FINE = 2.0**-16  # of the largest gradient: what one is rounded to
 _SHARE_STEP = 2.0**-12  # of a share of attention
 _WAYPOINT_STEP = 0.001
 GREYS = 255  # of a map's peak: what its cells are rounded to
+QUIET_SHARE = 0.01  # a map that moves the waypoints by less than that beside a component is small
 
 
 def look_columns(explanation: Explanation) -> dict[str, Column]:
@@ -39,11 +40,29 @@ def gradient_step(gradient: NDArray[np.float32]) -> float:
     return max(float(np.abs(gradient).max(initial=0.0)) * _FINE, 1e-12)
 
 
-def map_columns(maps: ActivationMaps) -> dict[str, Column]:
-    """Maps as shares of the peak that each has: cells, then peaks."""
+def map_columns(maps: ActivationMaps, gradient: NDArray[np.float32]) -> dict[str, Column]:
+    """Maps as shares of the peak that each has: cells, then peaks, then how much all cells are.
+
+    Args:
+        maps: The maps.
+        gradient: (N, G, 2) the components' at the same moments.
+    """
     peaks = maps.values.max(axis=(1, 2)).astype(np.float64)
     shares = maps.values / np.where(peaks > 0.0, peaks, 1.0)[:, None, None]
+    of_components = map_shares(maps, gradient)
     return {
         "cells": Column(values=shares, step=1.0 / GREYS, differences=0),
         "peak": Column(values=peaks, step=max(float(peaks.max()) * _FINE, 1e-12)),
+        "share": Column(values=of_components, step=max(float(of_components.max()) * _FINE, 1e-12)),
     }
+
+
+def map_shares(maps: ActivationMaps, gradient: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(N,) all of a map's cells together, as a share of the largest component's gradient, up to 1.
+
+    A cell says how far, in metres, what it holds moves the waypoints, to first order; a gradient
+    how far a step of unit length in a component's tokens does. Their orders can be compared.
+    """
+    together = maps.values.sum(axis=(1, 2), dtype=np.float64)
+    largest = np.abs(gradient).max(axis=(1, 2), initial=0.0).astype(np.float64)
+    return np.minimum(together, largest) / np.where(largest > 0.0, largest, 1.0)
