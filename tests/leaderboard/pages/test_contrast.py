@@ -12,9 +12,9 @@ TEXTS = ("ink", "faint", "accent", "bad")
 GROUNDS = ("page", "panel", "hover")
 
 
-def themes():
-    """The style sheet's colours, light and dark."""
-    style = static_text("style.css")
+def themes(sheet="style.css"):
+    """A style sheet's colours, light and dark."""
+    style = static_text(sheet)
     light, dark = (
         dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
         for block in re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]
@@ -43,6 +43,13 @@ def test_contrast_is_as_it_is_defined():
 def test_text_can_be_read(theme, ground):
     colours = themes()[theme]
     found = {text: contrast(colours[text], colours[ground]) for text in TEXTS}
+    assert min(found.values()) >= 4.5, found
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_names_of_responses_can_be_read_in_their_colours(theme):
+    panel, colours = themes()[theme]["panel"], themes("explain.css")[theme]
+    found = {name: contrast(colours[name], panel) for name in ("gx", "gy", "attention")}
     assert min(found.values()) >= 4.5, found
 
 
