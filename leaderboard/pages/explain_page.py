@@ -107,7 +107,7 @@ def _blocks(explanation: Explanation) -> Iterator[tuple[str, str]]:
         yield "image-sizes", write_block({}, sizes)
         yield "images", base64.b64encode(b"".join(explanation.images)).decode("ascii")
     for name, maps in _shown_maps(explanation).items():
-        yield f"map-{name}", write_block({}, map_columns(maps, explanation.gradient))
+        yield f"map-{name}", write_block({}, map_columns(maps, map_shares(explanation, name)))
     if explanation.what_if is not None:
         yield from _future_blocks(explanation, explanation.what_if)
 
@@ -173,7 +173,7 @@ def _head(explanation: Explanation, blocks: Mapping[str, str]) -> dict[str, Any]
                 "extent_m": maps.extent_m,
                 "camera": maps.camera,
                 "peak": float(maps.values.max(initial=0.0)),
-                "share": float(map_shares(maps, explanation.gradient).max(initial=0.0)),
+                "share": float(map_shares(explanation, name).max(initial=0.0)),
                 "quiet": QUIET_SHARE,
             }
             for name, maps in _shown_maps(explanation).items()

@@ -87,7 +87,7 @@
     scale.innerHTML = '<span></span> 0 <span class="heat"></span> <span></span>';
     scale.children[0].textContent = entry.name.replaceAll("_", " ");
     scale.children[1].style.background = `linear-gradient(90deg, ${[0, 0.25, 0.5, 0.75, 1].map((share) => `rgb(${di.looks.heat(share)})`)})`;
-    scale.children[2].textContent = `${entry.peak.toExponential(1)} m`;
+    scale.children[2].textContent = `${entry.peak.toExponential(1)} m, its component's G up to ${Number((100 * entry.share).toPrecision(2))} % of the largest`;
     return scale;
   }
 
@@ -131,15 +131,11 @@
       const waypoints = there.path && shows("path") ? looks.waypoints(i) : null;
       front.show(i, { map, waypoints, look: colours });
     }
-    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toExponential(1)} m (all cells ${percent(map.share(i))} of the largest G)`);
+    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toExponential(1)} m`);
     by_id("front-note").textContent = `looked at ${looks.time_s(i).toFixed(1)} s${peaks.length ? `; activation peaks: ${peaks.join(", ")}` : ""}`;
     if (told) tell_told(i);
     clearTimeout(naming);
     if (!playing && in_window) naming = setTimeout(() => history.replaceState(null, "", `#t=${now.time_s.toFixed(2)}`), 400);
-  }
-
-  function percent(share) {
-    return share >= 1 ? "over 100 %" : `${Number((100 * share).toPrecision(2))} %`;
   }
 
   function tell_told(i) {

@@ -5,7 +5,7 @@
 // looks.place(time_s) -> which moment; looks.time_s(i), looks.waypoints(i), looks.gradient(i, g),
 // looks.attention(i, layer, head, g), looks.has_responses
 // di.looks.map(entry, block) -> {entry, image(i) -> canvas, peak(i), share(i)};
-// di.looks.heat(share) -> [r, g, b]
+//   share: of its component's gradient in the largest one; di.looks.heat(share) -> [r, g, b]
 
 (function (di) {
   // From dark violet by red to light yellow: readable on light and dark, and in grey
