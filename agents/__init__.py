@@ -214,6 +214,19 @@ SCHEMES: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "human": AgentEntry(
+        entry_point="agents.human.agent:HumanAgent",
+        summary="human:keyboard, human:gamepad: a person, in the window of `driveinsight play`",
+        version=1,
+        argument="by",
+    ),
+    "llm": AgentEntry(
+        entry_point="agents.llm.agent:LanguageModelAgent",
+        summary="llm:MODULE:FUNCTION[?picture=on]: told the prompt as text, answers in JSON",
+        version=1,
+        argument="function",
+        packages=("highway-env", "stable-baselines3", "torch"),
+    ),
     "pickled": AgentEntry(
         entry_point="agents.pickled:PickledAgent",
         summary="pickled:FILE.pickle: a class or an instance that `leaderboard.evaluate` was given",
@@ -311,7 +324,7 @@ def _ours(spec: str, entry: AgentEntry, options: Mapping[str, Any]) -> Agent[Any
 
 def _make(spec: str, entry_point: str, options: Mapping[str, Any]) -> Agent[Any]:
     place, _, class_name = entry_point.rpartition(":")
-    module = _module_of(spec, place)
+    module = module_of(spec, place)
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
         known = [name for name, value in vars(module).items() if _defined_in(module, value)]
@@ -341,7 +354,16 @@ def _check_options(spec: str, found: type, options: Mapping[str, Any]) -> None:
             )
 
 
-def _module_of(spec: str, place: str) -> ModuleType:
+def module_of(spec: str, place: str) -> ModuleType:
+    """The module of a name, or of a Python file.
+
+    Args:
+        spec: The agent's specification, for the error.
+        place: `package.module`, or `path/to/file.py`.
+
+    Raises:
+        AgentSpecError: If there is none. Whatever the module's own code raises goes on.
+    """
     if place.endswith(".py"):
         return module_of_file(spec, Path(place))
     try:
@@ -395,4 +417,12 @@ def _hint(name: str, known: list[str]) -> str:
     return f"{start}known: {', '.join(known) or 'none'}."
 
 
-__all__ = ["AGENTS", "SCHEMES", "AgentEntry", "AgentSpecError", "load_agent", "module_of_file"]
+__all__ = [
+    "AGENTS",
+    "SCHEMES",
+    "AgentEntry",
+    "AgentSpecError",
+    "load_agent",
+    "module_of",
+    "module_of_file",
+]

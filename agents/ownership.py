@@ -11,8 +11,9 @@ from pathlib import Path
 
 from agents import AGENTS, SCHEMES
 
-# The schemes whose files are numbers and text: policies of ours, systems of the zoo
-_DATA_ONLY = ("driveinsight", "zoo")
+# The schemes that name no code: files of numbers and text (policies of ours, systems of the zoo),
+# and what a person drives by
+_NO_CODE = ("driveinsight", "zoo", "human")
 PICKLES = ("sb3", "pickled")  # those whose files run code as they are loaded
 _OURS = {*AGENTS, *(entry.entry_point for entry in AGENTS.values())}
 
@@ -20,13 +21,20 @@ _OURS = {*AGENTS, *(entry.entry_point for entry in AGENTS.values())}
 def code_of_others(spec: str) -> str:
     """What code that is not ours an agent's specification runs, in a few words; empty if none."""
     scheme, _, place = spec.partition(":")
-    if spec in _OURS or not place or scheme in _DATA_ONLY:
+    if spec in _OURS or not place or scheme in _NO_CODE:
         return ""
     if scheme in PICKLES:
         return f"the pickles in {_file_of(place)}"
+    if scheme == "llm":
+        return code_at(module_named(place))
     if scheme in SCHEMES:
         return f"the file {_file_of(place)}{_beside(place)}"
     return code_at(spec.rpartition(":")[0])
+
+
+def module_named(place: str) -> str:
+    """The module, or the Python file, of `module:function?option=value`."""
+    return place.partition("?")[0].rpartition(":")[0]
 
 
 def code_at(place: str) -> str:

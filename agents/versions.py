@@ -15,6 +15,7 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 
 from agents import AGENTS, SCHEMES, AgentEntry, named, place_and_options
+from agents.ownership import module_named
 
 
 def agent_version(spec: str) -> str:
@@ -32,6 +33,9 @@ def agent_version(spec: str) -> str:
         own = Path(__file__).parent / entry.data
         return _declared(name, entry, [own] if entry.data else [])
     scheme, _, place = spec.partition(":")
+    if scheme == "llm":
+        code = _code_of(module_named(place))
+        return f"{scheme} {SCHEMES[scheme].version}, files {_hash([code])}"
     if scheme in SCHEMES:
         path, options = place_and_options(spec, place)
         said = [part for value in options.values() for part in value.split(",")]
@@ -72,13 +76,13 @@ def _module(package: str) -> str:
 def _files_of_others(spec: str) -> list[Path]:
     """Those that a specification names: code, settings, pickles; without what is not there."""
     scheme, _, place = spec.partition(":")
-    if scheme in SCHEMES:
+    if scheme in SCHEMES and scheme != "llm":
         path, options = place_and_options(spec, place)
         found = [Path(path), *map(Path, options.values())]
     else:
         found = []
         with suppress(FileNotFoundError):
-            found = [_code_of(spec.rpartition(":")[0])]
+            found = [_code_of(module_named(place if scheme == "llm" else spec))]
     return [file for file in found if file.is_file()]
 
 

@@ -55,6 +55,13 @@ def test_driving_a_route_returns_its_score_in_metres():
     )
 
 
+def test_a_stand_in_for_a_language_model_drives_by_the_text_alone():
+    text = printed("language_model_agent.py")
+    assert "routing: a point each 5 m: (5.0, " in text
+    assert "ended by: completed" in text
+    assert number(r"driving score ([\d.]+)", text) > 60.0
+
+
 def test_branches_differ_by_their_control_alone():
     text = printed("save_branch_restore.py")
     assert "same branch, same bits: True" in text

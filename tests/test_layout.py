@@ -29,7 +29,7 @@ FLOORS = {
     ),
     "agents": (
         {""},
-        {"expert", "carla", "navigation", "sb3", "explain", "networks"},
+        {"expert", "carla", "navigation", "sb3", "explain", "networks", "human", "llm"},
         {"driveinsight"},
         {"training", "zoo"},
     ),

@@ -9,7 +9,7 @@ from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoadOption
 from di_envs.world.kinds import ActorKind
 
-_COMMANDS = {
+COMMANDS = {
     0: "none",
     RoadOption.LEFT: "turn left",
     RoadOption.RIGHT: "turn right",
@@ -27,7 +27,7 @@ def prompt_in_words(observation: Mapping[str, Any]) -> list[tuple[str, str]]:
         observation: With the group `prompt`.
     """
     return [
-        ("command", _COMMANDS[int(observation["command"])]),
+        ("command", COMMANDS[int(observation["command"])]),
         ("target point", where(observation["target_point"])),
         ("routing", _routing(_rows(observation["routing"]))),
         ("map", f"{int((observation['map'][:, :, 3].max(axis=1) > 0).sum())} polylines"),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from di_envs.config import check_name
 from di_envs.course import Course
 from di_envs.world.world import WorldView
+
+if TYPE_CHECKING:
+    from di_envs.drawing.window import Window
 
 RENDER_MODES = ("human", "rgb_array")
 
@@ -23,31 +26,50 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 class Screen:
-    """Draws a world for people in one of the render modes."""
+    """Draws a world for people in one of the render modes.
 
-    def __init__(self, course: Course, render_mode: str) -> None:
+    Attributes:
+        window: Where it is shown; None if it is handed to the caller.
+    """
+
+    def __init__(self, course: Course, render_mode: str, *, camera: bool = False) -> None:
         """Opens the window, if the mode is `human`.
+
+        Args:
+            course: What is driven.
+            render_mode: One of `RENDER_MODES`.
+            camera: Whether the window begins with the front camera's picture as the large one.
 
         Raises:
             RuntimeError: If there is no display for it.
         """
         # here, as who renders nothing needs none of it
+        from di_envs.drawing.driver_view import DriverView
         from di_envs.drawing.view import Renderer
         from di_envs.drawing.window import Window
 
-        self._window = Window("DriveInsight") if render_mode == "human" else None
+        self.window: Window | None = None
+        if render_mode == "human":
+            self.window = Window("DriveInsight", camera=camera)
         self._renderer = Renderer(course)
+        self._driver_view = DriverView(course, self._renderer)
         self._fps = 1.0 / course.config.control_dt_s
 
     def draw(self, view: WorldView, ego: int, observation: Mapping[str, Any]) -> Any:
         """Returns a picture (H, W, 3) uint8, or shows it in the window and returns None."""
-        frame = self._renderer.frame(view, ego, observation)
-        if self._window is None:
-            return frame
-        self._window.show(frame, self._fps)
+        window = self.window
+        if window is None:
+            return self._renderer.frame(view, ego, observation)
+
+        def picture() -> Any:
+            if window.camera:
+                return self._driver_view.frame(view, ego)
+            return self._renderer.frame(view, ego, observation)
+
+        window.show(picture, self._fps)
         return None
 
     def close(self) -> None:
         """Closes the window."""
-        if self._window is not None:
-            self._window.close()
+        if self.window is not None:
+            self.window.close()

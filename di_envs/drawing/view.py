@@ -41,10 +41,11 @@ MAP_PX = 640  # side of the map, on the left
 PIXELS_A_METRE = 7
 SMOOTHING = 2  # what moves is drawn so much larger, then averaged
 
-_PANEL, _TEXT, _FAINT, _TITLE = "#1d2126", "#eceff1", "#98a2ab", "#ffffff"
+PANEL = "#1d2126"  # beside the map
+_TEXT, _FAINT, _TITLE = "#eceff1", "#98a2ab", "#ffffff"
 _BAD, _BRAKE = "#ff6b5e", "#ff2a1f"
 _TROUGH = "#333a41"
-_MARGIN, _LINE_PX, _LABEL_PX = 14, 19, 96
+MARGIN, _LINE_PX, _LABEL_PX = 14, 19, 96
 _TEXT_PX, _TITLE_PX = 13, 17
 _CAMERA_PX = WIDTH_PX - MAP_PX
 _INFRACTIONS = (
@@ -80,16 +81,16 @@ class Renderer:
         Returns:
             (HEIGHT_PX, WIDTH_PX, 3) RGB.
         """
-        picture = Image.new("RGB", (WIDTH_PX, HEIGHT_PX), _PANEL)
+        picture = Image.new("RGB", (WIDTH_PX, HEIGHT_PX), PANEL)
         picture.paste(self.map(view, ego), (0, 0))
-        top = _MARGIN
+        top = MARGIN
         camera = (observation or {}).get("camera_front")
         if camera is not None:
             height = round(_CAMERA_PX * camera.shape[0] / camera.shape[1])
             shown = Image.fromarray(camera).resize((_CAMERA_PX, height))
             picture.paste(shown, (MAP_PX, 0))
             top += height
-        self._write(picture, view, ego, top)
+        self.write(picture, view, ego, top)
         return np.array(picture)
 
     # ---- the map
@@ -113,8 +114,9 @@ class Renderer:
 
     # ---- the text
 
-    def _write(self, picture: Any, view: WorldView, ego: int, top: int) -> None:
-        left, state = MAP_PX + _MARGIN, view.state
+    def write(self, picture: Any, view: WorldView, ego: int, top: int) -> None:
+        """Writes the facts of the drive into a picture's panel, right of the map, from `top` on."""
+        left, state = MAP_PX + MARGIN, view.state
         standing = standing_of(state, ego)
         info = self._course.info(view, ego, standing, standing, ())
         suite = self._course.config.suite or view.town.name
@@ -163,7 +165,7 @@ class Renderer:
 
     def _bar(self, picture: Any, left: int, top: int, name: str, value: float) -> int:
         """A held control as a bar, from the left or, for steering, from the middle."""
-        begin, end = left + _LABEL_PX, WIDTH_PX - _MARGIN - 44
+        begin, end = left + _LABEL_PX, WIDTH_PX - MARGIN - 44
         zero = (begin + end) / 2 if name == "steer" else begin
         reach = zero + value * (end - zero)
         pen = ImageDraw.Draw(picture)

@@ -80,5 +80,7 @@ class _WhatMatters:
         named = typed(rows / worst.driven.row.name)
         return [
             f"Next: driveinsight compare {typed(rows / 'baseline')} {named}",
+            f"      driveinsight report {named}       a page with its drives",
+            f"      driveinsight explain {named} --route ID       why it drove one so",
             f"      driveinsight verify {named}       does the claim stand?",
         ]

@@ -100,7 +100,9 @@ class Branch:
             say("Both futures are the same, to the bit.")
         say(
             f"Written: {picture} and the edited drive beside it.",
-            f"Next: driveinsight verify {typed(folder)}",
+            f"Next: driveinsight watch {typed(folder)}       the edited drive, in a window",
+            f"      driveinsight report {typed(folder)}       a page with its replay",
+            f"      driveinsight verify {typed(folder)}       does it stand?",
         )
         return EXIT_CRASHED if futures.edited.lost else 0
 

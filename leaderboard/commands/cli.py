@@ -37,12 +37,14 @@ from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.explain import EXPLAIN_HELP, Explain
 from leaderboard.commands.export import EXPORT_HELP, Export
 from leaderboard.commands.lists import Agents, Suites
+from leaderboard.commands.play import PLAY_HELP, Play
 from leaderboard.commands.report import REPORT_HELP, Report
 from leaderboard.commands.respond import RESPOND_HELP, Respond
 from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
 from leaderboard.commands.train import TRAIN_HELP, Train
 from leaderboard.commands.verify import VERIFY_HELP, Verify
+from leaderboard.commands.watch import WATCH_HELP, Watch
 
 HELP = """Drive agents in closed loop and score them as the CARLA Leaderboard does.
 
@@ -55,12 +57,16 @@ First steps:
   driveinsight explain results/expert-town05_tiny --route 0   why it drove one so, and what if
   driveinsight verify results/expert-town05_tiny          does the claim stand?
   driveinsight drive --agent expert --suite town05_tiny --video out.mp4
+  driveinsight watch results/expert-town05_tiny           a drive once more, in a window
+  driveinsight play --suite town05_tiny                   drive yourself, and be scored
   driveinsight collect                                    data to train a policy of your own
   driveinsight doctor                                     is all there? what to do if not"""
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate", description=EVALUATE_HELP)]
     | Annotated[Drive, tyro.conf.subcommand("drive", description=DRIVE_HELP)]
+    | Annotated[Play, tyro.conf.subcommand("play", description=PLAY_HELP)]
+    | Annotated[Watch, tyro.conf.subcommand("watch", description=WATCH_HELP)]
     | Annotated[Show, tyro.conf.subcommand("show", description=SHOW_HELP)]
     | Annotated[Report, tyro.conf.subcommand("report", description=REPORT_HELP)]
     | Annotated[Verify, tyro.conf.subcommand("verify", description=VERIFY_HELP)]

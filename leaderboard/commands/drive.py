@@ -46,7 +46,7 @@ class Drive(SceneArguments):
 
         from leaderboard.running.drive import drive, record_lines
         from leaderboard.running.jobs import RunSpec, SetupError
-        from leaderboard.running.video import VideoError, check_video
+        from leaderboard.running.video import VideoError, check_video, video_facts
 
         spec = RunSpec(
             agent=self.agent,
@@ -72,7 +72,10 @@ class Drive(SceneArguments):
         say(*record_lines(record))
         if self.video is not None:
             filmed = self._filmed_ns() not in (None, before)
-            say(f"Written: {self.video}" if filmed else f"Nothing was filmed: no {self.video}")
+            if filmed:
+                say(f"Written: {self.video} ({video_facts(self.video)})")
+            else:
+                say(f"Nothing was filmed: no {self.video}")
         return EXIT_CRASHED if record.lost else 0
 
     def _filmed_ns(self) -> int | None:

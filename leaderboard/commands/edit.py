@@ -83,4 +83,8 @@ class _WhatHolds:
         Terminal().print(prompt_editing_tables(study))
         say(f"Written: {', '.join(str(path) for path in [folder / STUDY_FILE, *written])}")
         baseline = typed(folder / "rows" / "baseline")
-        return [f"Next: driveinsight verify {baseline}       does the claim stand?"]
+        return [
+            f"Next: driveinsight report {baseline}       a page with its drives",
+            f"      driveinsight explain {baseline} --route ID       why it drove one so",
+            f"      driveinsight verify {baseline}       does the claim stand?",
+        ]

@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from di_envs.course import load_course
-from di_envs.drawing.view import MAP_PX, Renderer
+from di_envs.drawing.outlines import ACTOR, EDGE, EGO, LIGHT, ROUTE
+from di_envs.drawing.view import MAP_PX, PIXELS_A_METRE
+from di_envs.rules import rules_named
+from di_envs.world.kinds import ActorKind
+from di_envs.world.state import TICK_S
+from leaderboard.pages.branch_moments import Body, Moment, edited_actors, moments_of, shown_times
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.replaying.branch import Branch, branch_run
-from leaderboard.replaying.replay import replay, replay_env
-from leaderboard.replaying.timed_edits import decisions_before
+from leaderboard.scoring.names import EVENT_NAMES
 
-AFTER_S = (0.0, 2.0, 4.0, 8.0)  # moments after the branch that are shown
 PANEL_PX = 360
-_TEXT_PX, _TITLE_PX, _HEAD_PX, _GAP_PX = 14, 17, 34, 8
-_PAPER, _INK, _FAINT = "#ffffff", "#1d2126", "#6d767e"
+_TEXT_PX, _TITLE_PX, _HEAD_PX, _GAP_PX, _LEGEND_PX = 14, 17, 34, 8, 34
+_PAPER, _INK, _FAINT, _BAD = "#ffffff", "#1d2126", "#5b646c", "#c02a1f"
+MARK = "#d6006c"  # of edited actors: nothing else has this colour
+_NAMES = {
+    "ego": EGO,
+    **{"lorry" if kind is ActorKind.TRUCK else kind.name.lower(): ACTOR[kind] for kind in ACTOR},
+    "route, target points": ROUTE,
+    **{f"stop line: {state.name.lower()}": LIGHT[state] for state in LIGHT},
+    "no light": "#ffffff",
+}
 
 
 def write_branch_picture(path: Path, run: RunRecord, branch: Branch) -> None:
-    """Writes a PNG with a row of moments for each future.
+    """Writes a PNG with a row of moments for each future, and what the colours are.
 
     Args:
         path: Where to.
@@ -34,45 +44,100 @@ def write_branch_picture(path: Path, run: RunRecord, branch: Branch) -> None:
     Raises:
         OSError: If it cannot be written.
     """
+    actors, times_s = edited_actors(branch), shown_times(run, branch)
     edited = branch_run(run, branch)
     texts = [str(edit.to_text()) for edit in branch.edits]
     rows = [
         ("as recorded", run, branch.recorded),
         (f"with {'; '.join(texts) or 'nothing changed'}", edited, branch.edited),
     ]
-    width = len(AFTER_S) * (PANEL_PX + _GAP_PX) + _GAP_PX
-    picture = Image.new("RGB", (width, len(rows) * (PANEL_PX + _HEAD_PX + _GAP_PX)), _PAPER)
+    high = PANEL_PX + _HEAD_PX + _GAP_PX
+    width = len(times_s) * (PANEL_PX + _GAP_PX) + _GAP_PX
+    picture = Image.new("RGB", (width, len(rows) * high + _LEGEND_PX), _PAPER)
+    moments = [list(moments_of(of_run, record, times_s, actors)) for _, of_run, record in rows]
     for number, (title, of_run, record) in enumerate(rows):
-        top = number * (PANEL_PX + _HEAD_PX + _GAP_PX)
-        score = record.score
-        line = f"{title}: driving score {score.driving_score:.1f}, {record.status}"
-        _write(picture, (_GAP_PX, top + 8), line, _INK, _TITLE_PX)
-        for column, (time_s, view) in enumerate(_moments(of_run, record, branch.at_s)):
-            left = _GAP_PX + column * (PANEL_PX + _GAP_PX)
-            picture.paste(Image.fromarray(view), (left, top + _HEAD_PX))
-            label = f"{time_s:.1f} s"
-            box = (left, top + _HEAD_PX, left + 64, top + _HEAD_PX + 22)
-            ImageDraw.Draw(picture).rectangle(box, _PAPER)
-            _write(picture, (left + 6, top + _HEAD_PX + 3), label, _FAINT, _TEXT_PX)
+        line = f"{title}: driving score {record.score.driving_score:.1f}, {record.status}"
+        _write(picture, (_GAP_PX, number * high + 8), line, _INK, _TITLE_PX)
+        before = [None] * len(times_s) if number == 0 else moments[0]
+        for column, (moment, was) in enumerate(zip_longest(moments[number], before)):
+            place = (_GAP_PX + column * (PANEL_PX + _GAP_PX), number * high + _HEAD_PX)
+            picture.paste(_panel(moment, was), place)
+            _name(picture, place, moment, record, of_run)
+    marked = {f"actor {actor}, edited; crossed out: where it was": MARK for actor in actors[:1]}
+    _legend(picture, len(rows) * high + 8, {**_NAMES, **marked})
     picture.save(path)
 
 
-def _moments(
-    run: RunRecord, record: RouteRecord, at_s: float
-) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-    """The streets around the ego at each moment, or at the end where the route is over before."""
-    env = replay_env(run)
-    renderer = Renderer(load_course(env.config.changes()))
-    wanted = _decisions(at_s, env.config.control_dt_s, record.steps)
-    for step in replay(run, record, env=env):
-        if step.decision in wanted:
-            middle = (MAP_PX - PANEL_PX) // 2
-            shown = renderer.map(step.view).crop((middle, middle, *(2 * (MAP_PX - middle,))))
-            yield step.time_s, np.asarray(shown)
+def _panel(moment: Moment, was: Moment | None) -> Any:
+    """The middle of the streets, with edited actors ringed; crossed out where they are no more."""
+    edge = (MAP_PX - PANEL_PX) // 2
+    panel = moment.streets.crop((edge, edge, MAP_PX - edge, MAP_PX - edge))
+    pen = ImageDraw.Draw(panel)
+    for actor, body in moment.bodies.items():
+        _ring(pen, _corners(body, (0.0, 0.0)), str(actor))
+    for actor, body in ({} if was is None else was.bodies).items():
+        if actor not in moment.bodies:
+            assert was is not None
+            moved = (was.place[0] - moment.place[0], was.place[1] - moment.place[1])
+            _cross_out(pen, _corners(body, moved), str(actor))
+    return panel
 
 
-def _decisions(at_s: float, control_dt_s: float, last: int) -> Sequence[int]:
-    return [min(decisions_before(at_s + after, control_dt_s), last) for after in AFTER_S]
+def _corners(body: Body, moved_m: tuple[float, float]) -> list[tuple[float, float]]:
+    """Four corners [pixels of a panel] around a body, a little outside, one after the other."""
+    x, y = body.x_m + moved_m[0], body.y_m + moved_m[1]
+    cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
+    length, width = body.half_length_m + 0.4, body.half_width_m + 0.4
+    around = ((-length, -width), (-length, width), (length, width), (length, -width))
+    places = ((x + cos * a - sin * r, y + sin * a + cos * r) for a, r in around)
+    middle = PANEL_PX / 2
+    return [(middle + PIXELS_A_METRE * px, middle + PIXELS_A_METRE * py) for px, py in places]
+
+
+def _ring(pen: Any, corners: list[tuple[float, float]], label: str) -> None:
+    pen.line([*corners, corners[0]], _PAPER, 5, joint="curve")
+    pen.line([*corners, corners[0]], MARK, 3, joint="curve")
+    _label(pen, corners, label)
+
+
+def _cross_out(pen: Any, corners: list[tuple[float, float]], label: str) -> None:
+    first, second, third, fourth = corners
+    for line in ([*corners, first], [first, third], [second, fourth]):
+        pen.line(line, _PAPER, 4)
+        pen.line(line, MARK, 2)
+    _label(pen, corners, label)
+
+
+def _label(pen: Any, corners: Sequence[tuple[float, float]], label: str) -> None:
+    right, top = max(x for x, _ in corners) + 4, min(y for _, y in corners) - 4
+    font = ImageFont.load_default(_TEXT_PX)
+    pen.text((right, top), label, MARK, font, stroke_width=2, stroke_fill=_PAPER)
+
+
+def _name(
+    picture: Any, place: tuple[int, int], moment: Moment, record: RouteRecord, run: RunRecord
+) -> None:
+    """The moment's time, and the infractions that happen at it."""
+    kinds = rules_named(run.rules).infractions
+    now = [
+        EVENT_NAMES[event.kind]
+        for event in record.events
+        if event.kind in kinds and abs(event.time_s - moment.time_s) < TICK_S / 2
+    ]
+    time = f"{moment.time_s:.2f}".removesuffix("0")
+    label = " · ".join((f"{time} s", *now))
+    left, top = place
+    width = round(ImageFont.load_default(_TEXT_PX).getlength(label)) + 14
+    ImageDraw.Draw(picture).rectangle((left, top, left + width, top + 22), _PAPER)
+    _write(picture, (left + 6, top + 3), label, _BAD if now else _FAINT, _TEXT_PX)
+
+
+def _legend(picture: Any, top: int, colours: Mapping[str, str]) -> None:
+    left, pen = _GAP_PX, ImageDraw.Draw(picture)
+    for name, colour in colours.items():
+        pen.rectangle((left, top + 4, left + 14, top + 13), colour, EDGE)
+        _write(picture, (left + 19, top), name, _FAINT, _TEXT_PX - 1)
+        left += 19 + round(ImageFont.load_default(_TEXT_PX - 1).getlength(name)) + 12
 
 
 def _write(picture: Any, place: tuple[int, int], text: str, colour: str, size: int) -> None:

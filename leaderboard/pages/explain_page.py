@@ -21,7 +21,7 @@ from di_envs.town.plan import RoadOption
 from di_envs.world.state import TICK_S
 from leaderboard.explaining.explanation import Answer, Explanation, WhatIf
 from leaderboard.pages.explain_tables import answers_table, telling_events
-from leaderboard.pages.looks import look_columns, map_columns
+from leaderboard.pages.looks import QUIET_SHARE, look_columns, map_columns, map_shares
 from leaderboard.pages.markup import Markup, element, joined, json_script, static_text
 from leaderboard.pages.report_page import player_parts
 from leaderboard.pages.report_tables import event_text, facts_table
@@ -35,8 +35,8 @@ from leaderboard.running.front_camera import FRONT
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-explanation", 1
 SCRIPTS = (
-    *("blocks.js", "film.js", "town.js", "scene.js", "player.js", "transport.js"),
-    *("told.js", "looks.js", "front.js", "rows.js", "futures.js", "explain.js"),
+    *("blocks.js", "film.js", "town.js", "scene.js", "scale.js", "player.js", "transport.js"),
+    *("tables.js", "told.js", "looks.js", "front.js", "rows.js", "futures.js", "explain.js"),
 )
 FRAME_PX = 980  # height of the page in a notebook
 
@@ -107,7 +107,7 @@ def _blocks(explanation: Explanation) -> Iterator[tuple[str, str]]:
         yield "image-sizes", write_block({}, sizes)
         yield "images", base64.b64encode(b"".join(explanation.images)).decode("ascii")
     for name, maps in _shown_maps(explanation).items():
-        yield f"map-{name}", write_block({}, map_columns(maps))
+        yield f"map-{name}", write_block({}, map_columns(maps, map_shares(explanation, name)))
     if explanation.what_if is not None:
         yield from _future_blocks(explanation, explanation.what_if)
 
@@ -172,6 +172,9 @@ def _head(explanation: Explanation, blocks: Mapping[str, str]) -> dict[str, Any]
                 "columns": maps.values.shape[2],
                 "extent_m": maps.extent_m,
                 "camera": maps.camera,
+                "peak": float(maps.values.max(initial=0.0)),
+                "share": float(map_shares(explanation, name).max(initial=0.0)),
+                "quiet": QUIET_SHARE,
             }
             for name, maps in _shown_maps(explanation).items()
         ],

@@ -67,36 +67,40 @@ class Heading:
 
 @dataclass(frozen=True, kw_only=True)
 class TableOf:
-    """A table that can be sorted: its id, headings, rows, and a last row that stays last."""
+    """A table that can be sorted: its id, headings, rows, and a last row that stays last.
+
+    `ascending` names the heading by which the rows stand in order already.
+    """
 
     id: str
     headings: Sequence[Heading]
     rows: Sequence[Sequence[Cell]]
     last: Sequence[Cell] = field(default=())
+    ascending: str = ""
 
     def markup(self) -> Markup:
         """The table as HTML; `data-sort` tells the page's script how each column is sorted."""
-        head = element("tr", *(_heading(heading) for heading in self.headings))
+        head = element("tr", *(self._heading(heading) for heading in self.headings))
         body = joined(self._row(row) for row in self.rows)
         parts = [element("thead", head), element("tbody", body)]
         if self.last:
             parts.append(element("tfoot", self._row(self.last)))
         return element("table", *parts, id=self.id, class_="sortable")
 
+    def _heading(self, heading: Heading) -> Markup:
+        return element(
+            "th",
+            heading.name,
+            scope="col",
+            class_="number" if heading.number else None,
+            data_sort="number" if heading.number else "text",
+            aria_sort="ascending" if heading.name == self.ascending else None,
+            title=heading.note,
+        )
+
     def _row(self, row: Sequence[Cell]) -> Markup:
         pairs = zip(self.headings, row, strict=True)
         return element("tr", *(_cell(heading, cell) for heading, cell in pairs))
-
-
-def _heading(heading: Heading) -> Markup:
-    return element(
-        "th",
-        heading.name,
-        scope="col",
-        class_="number" if heading.number else None,
-        data_sort="number" if heading.number else "text",
-        title=heading.note,
-    )
 
 
 def _cell(heading: Heading, cell: Cell) -> Markup:

@@ -19,6 +19,7 @@ from leaderboard.pages.report_tables import (
     facts_table,
     route_table,
     summary_cards,
+    worst_first,
 )
 from leaderboard.pages.route_films import RouteFilm, event_heads, film_routes
 from leaderboard.records.claim_text import NOT_ISOLATED, in_reach
@@ -28,7 +29,7 @@ from leaderboard.replaying.replay import ReplayError, replay_env
 
 PAGE_FORMAT, PAGE_VERSION = "driveinsight-report", 1
 SCRIPTS = (
-    *("blocks.js", "film.js", "town.js", "scene.js", "player.js", "transport.js"),
+    *("blocks.js", "film.js", "town.js", "scene.js", "scale.js", "player.js", "transport.js"),
     *("tables.js", "overview.js", "report.js"),
 )
 
@@ -61,7 +62,9 @@ def report_page(run: RunRecord, films: Sequence[RouteFilm], town: Town) -> str:
         films: Its routes that the page is about.
         town: Where they lead through.
     """
-    records = [film.record for film in films]
+    by_index = {film.record.index: film for film in films}
+    records = worst_first([film.record for film in films])
+    films = [by_index[record.index] for record in records]
     shown = {film.record.index for film in films if film.block}
     title = f"{run.agent} on {run.suite}"
     seeds = f"seed{'s' if len(run.seeds) > 1 else ''} {', '.join(map(str, run.seeds))}"

@@ -24,17 +24,17 @@ from leaderboard.tables.run_tables import (
 ROUTE_HEADINGS = (
     Heading(name="route"),
     Heading(name="seed", number=True),
-    Heading(name="DS", number=True, note="driving score: RC x IS"),
+    Heading(name="DS", number=True, note="driving score, percent: RC x IS"),
     Heading(name="RC", number=True, note="route completion, percent"),
     Heading(name="IS", number=True, note="infraction score, 0 to 1"),
     Heading(
         name="bound",
         number=True,
-        note="DS of a perfect driver on empty roads with the same lights, under the timeout",
+        note="DS, percent, of a perfect driver on empty roads with the same lights, in the time",
     ),
     Heading(name="infr./km", number=True, note="infractions that lower IS, a kilometre driven"),
     Heading(name="km", number=True, note="driven, of the route's length"),
-    Heading(name="time", number=True, note="game time, seconds"),
+    Heading(name="time [s]", number=True, note="game time"),
     Heading(name="status"),
     Heading(name="infractions"),
     Heading(name="scenarios", note="the Leaderboard's number, and how many began"),
@@ -42,11 +42,16 @@ ROUTE_HEADINGS = (
 EVENT_HEADINGS = (
     Heading(name="route"),
     Heading(name="seed", number=True),
-    Heading(name="time", number=True, note="game time, seconds"),
+    Heading(name="time [s]", number=True, note="game time"),
     Heading(name="infraction"),
     Heading(name="with"),
-    Heading(name="place", note="x, y in the world frame, metres"),
+    Heading(name="place x, y [m]", note="in the world frame"),
 )
+
+
+def worst_first(records: Sequence[RouteRecord]) -> list[RouteRecord]:
+    """Lost routes, then those of the lowest driving score: what a reader is to look at first."""
+    return sorted(records, key=lambda r: (not r.lost, r.score.driving_score, r.index))
 
 
 def event_text(event: EventRecord) -> str:
@@ -88,13 +93,14 @@ def route_table(run: RunRecord, records: Sequence[RouteRecord], shown: set[int])
 
     Args:
         run: The run.
-        records: Its routes that the page is about.
+        records: Its routes that the page is about, see `worst_first`.
         shown: Those that can be replayed, by `index`.
     """
     rows = [_route_row(run, record, replayed=record.index in shown) for record in records]
     driven = [record for record in records if not record.lost]
     last = _mean_row(run, driven) if driven else ()
-    return TableOf(id="routes", headings=ROUTE_HEADINGS, rows=rows, last=last).markup()
+    table = TableOf(id="routes", headings=ROUTE_HEADINGS, rows=rows, last=last, ascending="DS")
+    return table.markup()
 
 
 def _route_row(run: RunRecord, record: RouteRecord, *, replayed: bool) -> list[Cell]:
@@ -192,14 +198,17 @@ def summary_cards(run: RunRecord, records: Sequence[RouteRecord]) -> Markup:
     if not driven:
         return element("p", "No route was driven: there is no score.", class_="none")
     mean = _mean_row(run, driven)
-    names = ("driving score", "route completion", "infraction score", "bound", "infractions a km")
+    names = (
+        *("driving score, %", "route completion, %", "infraction score, 0 to 1"),
+        *("bound on the score, %", "infractions a km"),
+    )
     cards = [_card(name, cell.shows) for name, cell in zip(names, mean[2:7], strict=True)]
     cards[0] = _card(names[0], mean[2].shows, main=True)
     return joined([*cards, _card("km driven", f"{_driven_km(driven):.1f}")])
 
 
 def _card(name: str, value: Content, *, main: bool = False) -> Markup:
-    parts = (element("dd", value), element("dt", name))
+    parts = (element("dt", name), element("dd", value))
     return element("div", *parts, class_="card main" if main else "card")
 
 

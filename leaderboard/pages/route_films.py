@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from di_envs.route_env import RouteEnv
+from di_envs.rules import rules_named
 from di_envs.world.event_names import EVENT_KEYS
-from di_envs.world.kinds import ActorKind
+from di_envs.world.kinds import ActorKind, EventKind
 from di_envs.world.state import TICK_S
 from leaderboard.pages.report_tables import (
     event_text,
@@ -97,6 +98,8 @@ def _checked(steps: Iterator[ReplayStep], record: RouteRecord) -> Iterator[Repla
 def event_heads(record: RouteRecord, run: RunRecord) -> list[dict[str, Any]]:
     """A route's events as a page's script takes them."""
     counted = set(shown_events(record, run))
+    rules = rules_named(run.rules)
+    told = {*rules.infractions, *rules.endings, EventKind.SCENARIO}
     return [
         {
             "time_s": event.time_s,
@@ -106,6 +109,7 @@ def event_heads(record: RouteRecord, run: RunRecord) -> list[dict[str, Any]]:
             "x": round(event.x, 2),
             "y": round(event.y, 2),
             "counts": event in counted,
+            "apart": event.kind not in told,  # what other rules count, and these do not
         }
         for event in record.events
     ]

@@ -22,7 +22,12 @@ from leaderboard.running.messages import RunFacts
 from leaderboard.running.wall_clock import Doing, Stopwatch
 
 
-def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None) -> Driver:
+def set_up(
+    spec: RunSpec,
+    watch: Stopwatch,
+    requires: Requirements | None = None,
+    place: AgentPlace | None = None,
+) -> Driver:
     """The run's driver.
 
     Args:
@@ -30,12 +35,13 @@ def set_up(spec: RunSpec, watch: Stopwatch, requires: Requirements | None = None
         watch: Where the driver marks what it is doing.
         requires: What the agent requires, if that is known; else one is made and asked, and the
             edits are checked against it.
+        place: Where agents are made; None for one of its own.
 
     Raises:
         SetupError: If the agent cannot be made, or the environment refuses its options.
     """
     watch.mark(Doing.SETTING_UP)
-    place = AgentPlace(spec, watch)
+    place = place or AgentPlace(spec, watch)
     if requires is not None:
         return _loaded(spec, watch, requires, place)
     agent, requires = made_agent(spec.agent, place)

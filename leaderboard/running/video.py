@@ -18,8 +18,11 @@ from typing_extensions import Self
 
 FFMPEG_SUFFIXES = (".mp4", ".mkv", ".mov")
 GIF_SUFFIX = ".gif"
-GIF_WIDTH_PX = 480  # all frames of a GIF are held in memory until it is written
 GIF_FPS = 10.0
+# A frame takes 6 to 18 kB: so a GIF of any length stays near 10 MB, and in memory until written
+GIF_WIDTH_PX, GIF_FRAMES = 480, 600  # a minute
+LONG_GIF_WIDTH_PX, LONG_GIF_FRAMES = 320, 1200
+_LARGE_BYTES = 5_000_000  # of a GIF: from here on it is said that there are smaller forms
 _CODED = ("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-preset", "veryfast")
 _TRIAL_S = 30.0  # for a program to code one frame
 
@@ -177,22 +180,33 @@ class FfmpegWriter:
 
 
 class GifWriter:
-    """Keeps smaller frames, at most `GIF_FPS` a second, and writes them at the end."""
+    """Keeps smaller frames, at most `GIF_FPS` a second, and writes them at the end.
+
+    How many there will be is not known before. Beyond `GIF_FRAMES` all become smaller; whenever
+    there are `LONG_GIF_FRAMES`, every second one goes, and the rate halves.
+    """
 
     def __init__(self, path: Path, fps: float) -> None:
-        self._path = path
+        self._path, self._fps = path, fps
         self._every = max(1, round(fps / GIF_FPS))
-        self._frame_ms = round(1000.0 * self._every / fps)
+        self._width_px = GIF_WIDTH_PX
         self._seen = 0
         self._frames: list[Image.Image] = []
 
     def add(self, frame: NDArray[np.uint8]) -> None:
         """Adds a frame, or passes over it where they come too fast for a GIF."""
         if self._seen % self._every == 0:
-            height = round(frame.shape[0] * GIF_WIDTH_PX / frame.shape[1])
-            small = Image.fromarray(frame).resize((GIF_WIDTH_PX, height))
-            self._frames.append(small.quantize(128, Image.Quantize.FASTOCTREE))
+            self._frames.append(_smaller(Image.fromarray(frame), self._width_px))
+            self._keep_small()
         self._seen += 1
+
+    def _keep_small(self) -> None:
+        if len(self._frames) > GIF_FRAMES and self._width_px != LONG_GIF_WIDTH_PX:
+            self._width_px = LONG_GIF_WIDTH_PX
+            self._frames = [_smaller(f.convert("RGB"), self._width_px) for f in self._frames]
+        if len(self._frames) > LONG_GIF_FRAMES:
+            self._frames = self._frames[::2]
+            self._every *= 2
 
     def __enter__(self) -> Self:
         return self
@@ -203,6 +217,23 @@ class GifWriter:
                 self._path,
                 save_all=True,
                 append_images=self._frames[1:],
-                duration=self._frame_ms,
+                duration=round(1000.0 * self._every / self._fps),
                 loop=0,
             )
+
+
+def _smaller(frame: Image.Image, width_px: int) -> Image.Image:
+    """A frame of that width, with colours as a GIF has them."""
+    size = (width_px, round(frame.height * width_px / frame.width))
+    return frame.resize(size).quantize(128, Image.Quantize.FASTOCTREE)
+
+
+def video_facts(path: Path) -> str:
+    """How large a video's file is, and what would be smaller: `1.2 MB`."""
+    size = path.stat().st_size
+    facts = f"{size / 1e6:.1f} MB"
+    if path.suffix.lower() != GIF_SUFFIX:
+        return facts
+    with Image.open(path) as gif:
+        facts += f", {gif.width} x {gif.height} pixels"
+    return f"{facts}; .mp4 is sharper and smaller" if size > _LARGE_BYTES else facts

@@ -33,7 +33,11 @@
   by_id("front-figure").hidden = front === null;
   by_id("told-colours").hidden = told === null;
   by_id("heat-hint").hidden = maps.length === 0;
-  by_id("heat").style.background = `linear-gradient(90deg, ${[0, 0.25, 0.5, 0.75, 1].map((share) => `rgb(${di.looks.heat(share)})`)})`;
+  by_id("heat-scales").replaceChildren(...maps.map(heat_scale));
+  for (const [name, map] of [["bev", bev], ["camera", camera_map]]) {
+    if (map) by_id(`show-${name}`).checked = map.entry.share >= map.entry.quiet;
+  }
+  di.tables.enhance(document);
 
   const layers = {
     way: () => !(there.told && shows("told")),
@@ -76,9 +80,20 @@
     return film.at(looks.time_s(looks.place(now.time_s))).ego;
   }
 
+  // A map's colours from none to its peak in the drive, with the numbers
+  function heat_scale({ entry }) {
+    const scale = document.createElement("span");
+    scale.className = "heat-scale";
+    scale.innerHTML = '<span></span> 0 <span class="heat"></span> <span></span>';
+    scale.children[0].textContent = entry.name.replaceAll("_", " ");
+    scale.children[1].style.background = `linear-gradient(90deg, ${[0, 0.25, 0.5, 0.75, 1].map((share) => `rgb(${di.looks.heat(share)})`)})`;
+    scale.children[2].textContent = `${entry.peak.toExponential(1)} m, its component's G up to ${Number((100 * entry.share).toPrecision(2))} % of the largest`;
+    return scale;
+  }
+
   function responses() {
     by_id("responses").hidden = false;
-    const marks = head.events.map((event) => ({ time_s: event.time_s, name: event.counts ? "bad" : "faint" }));
+    const marks = head.events.filter((event) => !event.apart).map((event) => ({ time_s: event.time_s, name: event.counts ? "bad" : "faint" }));
     if (head.what_if) marks.push({ time_s: head.what_if.at_s, name: "accent" });
     const made = di.rows.on(by_id("rows"), { head, looks, end_s: film.end_s, events: head.events, marks, on_time: (time_s) => transport.jump(time_s) });
     for (let layer = 0; layer < head.layers; layer++) by_id("layer").append(new Option(String(layer + 1), String(layer)));
@@ -116,7 +131,7 @@
       const waypoints = there.path && shows("path") ? looks.waypoints(i) : null;
       front.show(i, { map, waypoints, look: colours });
     }
-    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toExponential(1)}`);
+    const peaks = maps.map((map) => `${map.entry.name.replaceAll("_", " ")} ${map.peak(i).toExponential(1)} m`);
     by_id("front-note").textContent = `looked at ${looks.time_s(i).toFixed(1)} s${peaks.length ? `; activation peaks: ${peaks.join(", ")}` : ""}`;
     if (told) tell_told(i);
     clearTimeout(naming);

@@ -4,13 +4,16 @@
 // const looks = di.looks.of(head, block)
 // looks.place(time_s) -> which moment; looks.time_s(i), looks.waypoints(i), looks.gradient(i, g),
 // looks.attention(i, layer, head, g), looks.has_responses
-// di.looks.map(entry, block) -> {entry, image(i) -> canvas, peak(i)}; di.looks.heat(share) -> [r, g, b]
+// di.looks.map(entry, block) -> {entry, image(i) -> canvas, peak(i), share(i)};
+//   share: of its component's gradient in the largest one; di.looks.heat(share) -> [r, g, b]
 
 (function (di) {
   // From dark violet by red to light yellow: readable on light and dark, and in grey
   const HEAT = [
     [0.0, [24, 8, 60]], [0.25, [112, 24, 110]], [0.5, [203, 56, 74]], [0.75, [249, 142, 40]], [1.0, [252, 250, 160]],
   ];
+
+  const FAINTEST = 0.35; // how much is left of a map that is as good as nothing beside the components
 
   function heat(share) {
     const upper = Math.max(1, HEAT.findIndex(([from]) => from >= share));
@@ -50,20 +53,23 @@
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = ground ? [rows, wide] : [wide, rows];
     const context = canvas.getContext("2d");
+    const fade = (i) => FAINTEST + (1 - FAINTEST) * Math.min(1, columns.share[i] / entry.quiet);
     let drawn = -1;
     return {
       entry,
       peak: (i) => columns.peak[i],
+      share: (i) => columns.share[i],
       image(i) {
         if (i === drawn) return canvas;
         drawn = i;
+        const of_drive = entry.peak > 0 ? columns.peak[i] / entry.peak : 0; // one scale for all moments
         const picture = context.createImageData(canvas.width, canvas.height);
         for (let row = 0; row < rows; row++) {
           for (let column = 0; column < wide; column++) {
-            const share = columns.cells[(i * rows + row) * wide + column];
+            const share = of_drive * columns.cells[(i * rows + row) * wide + column];
             const at = 4 * (ground ? column * rows + row : row * wide + column);
             picture.data.set(heat(share), at);
-            picture.data[at + 3] = 220 * Math.min(1, 1.5 * share ** 1.2);
+            picture.data[at + 3] = 220 * fade(i) * Math.min(1, 1.5 * share ** 1.2);
           }
         }
         context.putImageData(picture, 0, 0);

@@ -11,11 +11,13 @@
     const whole = svg.viewBox.baseVal;
     const full = { x: whole.x, y: whole.y, width: whole.width, height: whole.height };
     let view = { ...full };
+    const bar = svg.parentElement.querySelector(".scale");
     let dragged = 0;
 
     function show() {
       svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.width} ${view.height}`);
       const pixels = Math.max(svg.clientWidth, 1);
+      di.scale.show(bar, 100 * Math.min(pixels / view.width, Math.max(svg.clientHeight, 1) / view.height));
       svg.style.setProperty("--mark", Math.max(view.width, (view.height * pixels) / Math.max(svg.clientHeight, 1)) / Math.max(pixels, MARKS * 0.6));
     }
 

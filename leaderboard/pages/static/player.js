@@ -15,6 +15,7 @@
   function on(canvas, town, { on_time = () => {}, layers = {}, turns = false } = {}) {
     const context = canvas.getContext("2d");
     const camera = { x: 0, y: 0, scale: SCALE, turn: 0 };
+    const bar = canvas.parentElement.querySelector(".scale");
     const away = { x: 0, y: 0 }; // from the ego, by dragging [m]
     let colours = di.scene.look(canvas);
     let film = null;
@@ -54,6 +55,7 @@
       camera.x += away.x;
       camera.y += away.y;
       di.scene.draw(context, size, { town, film, now, camera, look: colours, layers });
+      di.scale.show(bar, camera.scale);
       on_time(now, playing);
     }
 

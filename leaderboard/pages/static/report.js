@@ -36,6 +36,15 @@
     return { route, time_s: Number(given.get("t")) || 0 };
   }
 
+  // Routes stand worst first: what went wrong first in the worst of those in which something did
+  function first_infraction() {
+    for (const route of playable) {
+      const event = route.events.find((one) => one.counts);
+      if (event) return [route, event.time_s];
+    }
+    return [playable[0], 0];
+  }
+
   async function open(route, time_s) {
     try {
       if (!films.has(route.block)) {
@@ -88,7 +97,8 @@
 
   async function follow_address({ look }) {
     const { route, time_s } = wanted();
-    await open(route ?? shown ?? playable[0], time_s);
+    if (route || shown) await open(route ?? shown, time_s);
+    else await open(...first_infraction());
     if (look && route) by_id("replay").scrollIntoView({ block: "start" });
   }
 

@@ -82,7 +82,11 @@
     return {
       jump,
       show(other, until_s) {
-        [events, end_s] = [other, until_s];
+        [events, end_s] = [other.filter((event) => !event.apart), until_s];
+        const apart = other.filter((event) => event.apart);
+        by_id("apart").hidden = apart.length === 0;
+        by_id("apart").firstElementChild.textContent = `Of no account under these rules, such as the pace: ${apart.length}`;
+        by_id("apart-list").replaceChildren(...apart.map(line));
         by_id("scrub").max = end_s;
         by_id("ticks").replaceChildren(...events.map((event) => tick(event, end_s)));
         by_id("event-list").replaceChildren(...events.map(line));

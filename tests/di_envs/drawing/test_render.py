@@ -12,6 +12,8 @@ import pytest
 from PIL import Image, ImageColor
 
 import di_envs
+from di_envs.course import load_course
+from di_envs.drawing.driver_view import DriverView
 from di_envs.drawing.map_tiles import TILE_PX, MapTiles
 from di_envs.drawing.outlines import EGO, LAND, LIGHT, ROUTE, box, stop_line_colours, stop_line_ends
 from di_envs.drawing.prompt_text import prompt_in_words, where
@@ -246,6 +248,18 @@ def test_each_world_and_each_ego_has_a_picture_of_its_own():
     egos.reset(seed=1)
     assert near(egos.render()[CENTRE, CENTRE], EGO)
     assert not np.array_equal(egos.render("ego_0"), egos.render("ego_1"))
+
+
+@pytest.mark.parametrize("route", [0, 1])
+def test_behind_the_wheel_the_way_leads_up_from_the_ego(route, env):
+    env.reset(seed=2, options={"route": route})
+    course = load_course(env.config.changes())
+    frame = DriverView(course, Renderer(course)).frame(env.view)
+    assert frame.shape == (HEIGHT_PX, WIDTH_PX, 3)
+    row, pixels_a_metre = 360 + 170 * 280 // 228, PIXELS_A_METRE * 640 / 520
+    assert near(frame[row, CENTRE], EGO)
+    ahead = frame[round(row - 7.0 * pixels_a_metre), CENTRE - 6 : CENTRE + 6]
+    assert any(near(pixel, ROUTE) for pixel in ahead)
 
 
 OPEN_A_WINDOW = """

@@ -94,6 +94,11 @@ def test_the_pages_activation_maps_are_the_arrays_to_a_grey_level(explained, pag
     for entry in head["maps"]:
         block, values = block_of(page, entry["block"]), explained.maps[entry["name"]].values
         assert block["peak"] == pytest.approx(values.max(axis=(1, 2)), rel=1e-3)
+        strength = np.abs(explained.gradient).max(axis=2)
+        of_bev = strength[:, explained.groups.index("bev")] / strength.max(axis=1)
+        assert block["share"] == pytest.approx(of_bev, abs=1e-4)
+        assert entry["share"] == pytest.approx(of_bev.max())
+        assert entry["peak"] == pytest.approx(values.max())
         cells = block["cells"].reshape(-1, entry["rows"], entry["columns"])
         shares = values / values.max(axis=(1, 2), keepdims=True)
         assert np.abs(cells - shares).max() <= 0.51 / GREYS

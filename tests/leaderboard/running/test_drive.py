@@ -26,7 +26,14 @@ from leaderboard.running.driver import Driver
 from leaderboard.running.front_camera import FRONT, front_camera, with_front_camera
 from leaderboard.running.interventions import read_interventions
 from leaderboard.running.jobs import Job, RunSpec
-from leaderboard.running.video import GIF_WIDTH_PX, VideoError, check_video, open_video
+from leaderboard.running.video import (
+    GIF_WIDTH_PX,
+    LONG_GIF_WIDTH_PX,
+    VideoError,
+    check_video,
+    open_video,
+    video_facts,
+)
 from leaderboard.running.warm_up import WARM_UP_STEPS
 
 ROUTE = load_suite("toy").specs()[0].route_id
@@ -268,3 +275,24 @@ def test_a_gif_of_fast_frames_leaves_some_out_and_keeps_its_pace(tmp_path):
     with Image.open(tmp_path / "one.gif") as gif:
         assert gif.n_frames == 5
         assert gif.info["duration"] == 100
+
+
+@pytest.mark.parametrize(
+    ("frames", "width_px", "frame_ms"),
+    [(4, GIF_WIDTH_PX, 100), (6, LONG_GIF_WIDTH_PX, 100), (10, LONG_GIF_WIDTH_PX, 200)],
+)
+def test_a_long_gif_has_smaller_pictures_and_then_fewer(
+    frames, width_px, frame_ms, tmp_path, monkeypatch
+):
+    """Limits of 4 and 8 frames in place of 600 and 1200, for the test's sake."""
+    monkeypatch.setattr("leaderboard.running.video.GIF_FRAMES", 4)
+    monkeypatch.setattr("leaderboard.running.video.LONG_GIF_FRAMES", 8)
+    path = tmp_path / "long.gif"
+    with open_video(path, 10.0) as film:
+        for number in range(frames):
+            film.add(np.full((20, 30, 3), 20 * number, np.uint8))
+    with Image.open(path) as gif:
+        assert gif.width == width_px
+        assert gif.info["duration"] == frame_ms
+        assert gif.n_frames == frames * 100 // frame_ms
+    assert video_facts(path).endswith(f" MB, {width_px} x {gif.height} pixels")

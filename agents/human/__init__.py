@@ -1,0 +1,1 @@
+"""A person as an agent: drives by keyboard or gamepad in `driveinsight play`."""
