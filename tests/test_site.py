@@ -112,6 +112,16 @@ def test_links_to_code_lead_to_the_repository_where_one_is_named(site, monkeypat
     )
 
 
+def test_the_package_page_links_the_repository_where_one_is_named():
+    page = runpy.run_path(str(TOP / "setup.py"))["package_page"]
+    text = "![a](docs/images/a.png) [b](docs/b.md#c) [d](https://example.org) [e](#f)"
+    assert page(text, "https://example.org/us/it") == (
+        "![a](https://example.org/us/it/raw/HEAD/docs/images/a.png) "
+        "[b](https://example.org/us/it/blob/HEAD/docs/b.md#c) [d](https://example.org) [e](#f)"
+    )
+    assert page(text, "") == text
+
+
 def test_how_to_cite_is_what_the_citation_file_says(site):
     text = site["tree"].cite_page((TOP / "CITATION.cff").read_text(encoding="utf-8"))
     assert "title = {Exploring the Causality of End-to-End Autonomous Driving}" in text
@@ -121,7 +131,7 @@ def test_how_to_cite_is_what_the_citation_file_says(site):
 def test_the_tables_of_the_leaderboard_are_those_of_its_records():
     board = runpy.run_path(str(TOP / "docs" / "scripts" / "leaderboard_page.py"))
     records = board["read_records"]()
-    assert len(records) >= 4
+    assert records
     page = (TOP / "docs" / "leaderboard.md").read_text(encoding="utf-8")
     assert page == board["with_tables"](page, board["tables"](records)), (
         "python docs/scripts/leaderboard_page.py draws them anew"
@@ -136,9 +146,9 @@ def test_a_row_of_the_leaderboard_can_be_redone_on_paper():
         "columns": list(board["COLUMNS"]),
         "routes": [["0", 0, 70.0, 100.0, 0.7, 100.0, 1.0], ["1", 0, 49.0, 100.0, 0.49, 80.0, 0.5]],
     }
-    assert board["line"]("leaderboard/toy/mine.json", record) == (
+    assert board["line"]("records/toy/mine.json", record) == (
         "| `mine` (mine 1) | PROMPT | 59.5 | 100.0 | 0.59 | 90.0 | 2.00 | 1 | "
-        "[mine.json](leaderboard/toy/mine.json) |"
+        "[mine.json](records/toy/mine.json) |"
     )
 
 

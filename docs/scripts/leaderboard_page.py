@@ -26,7 +26,7 @@ from leaderboard.statistics.confidence import MeanInterval, mean_interval
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGE = DOCS / "leaderboard.md"
-RECORDS = DOCS / "leaderboard"
+RECORDS = DOCS / "records"
 BEGIN, END = "<!-- tables: python docs/scripts/leaderboard_page.py -->", "<!-- tables end -->"
 HEADER = (
     "| agent | track | DS | RC | IS | bound | infractions a km | seeds | record |",
