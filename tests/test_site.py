@@ -9,7 +9,7 @@ import runpy
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -48,11 +48,13 @@ def test_the_reference_has_every_command_with_every_option_of_it(reference):
         name = described.name
         text, listed = (reference[f"reference/commands/{page}.md"] for page in (name, "index"))
         assert f"[`{name}`]({name}.md)" in listed
+        hints = get_type_hints(kind, include_extras=True)
         for field in dataclasses.fields(kind):
-            option = f"--{field.name.replace('_', '-')}"
-            positional = "positional arguments" in text and field.default is dataclasses.MISSING
-            renamed = (name, field.name) == ("train", "listed")
-            assert option in text or positional or renamed, (name, option)
+            said = getattr(hints[field.name], "__metadata__", ())
+            called = next((each.name for each in said if getattr(each, "name", None)), field.name)
+            positional = any("Positional" in repr(each) for each in said)
+            option = "positional arguments" if positional else f"--{called.replace('_', '-')}"
+            assert option in text, (name, option)
 
 
 def test_the_reference_has_every_option_edit_rule_and_agent(reference):

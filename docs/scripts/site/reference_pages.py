@@ -35,7 +35,7 @@ from leaderboard.commands.cli import Command
 from wrappers.interventions.edit import ObservationEdit
 from wrappers.interventions.table import EDITS
 
-HELP_COLUMNS = "92"
+HELP_COLUMNS = "84"
 MADE = "reference/{}.md"
 # What can be imported, by the page that it stands on: objects, or whole modules
 API: Mapping[str, tuple[str, tuple[str, ...]]] = {
