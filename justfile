@@ -29,6 +29,10 @@ lint:
 docs *options:
     {{python}} -m pytest tests/test_docs.py tests/test_contributing.py tests/test_examples.py {{options}}
 
+# The documentation as a site, in build/site, without warnings (extra docs)
+site *options:
+    {{python}} -m mkdocs build --strict {{options}}
+
 # Draws the pictures of docs/ that need no recorded run
 pictures:
     {{python}} docs/scripts/floors.py

@@ -192,7 +192,7 @@ SCHEMES: dict[str, AgentEntry] = {
     ),
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="driveinsight:FOLDER: a policy that `driveinsight train` wrote",
+        summary="driveinsight:FOLDER, :hf:OWNER/REPO: a policy that `driveinsight train` wrote",
         version=2,
         argument="weights",
         data_files=POLICY_FILES,
@@ -200,7 +200,7 @@ SCHEMES: dict[str, AgentEntry] = {
     ),
     "zoo": AgentEntry(
         entry_point="agents.zoo.loading:FolderDriver",
-        summary="zoo:FOLDER[?rules=off]: a system of the zoo that `driveinsight train` wrote",
+        summary="zoo:FOLDER[?rules=off], :hf:OWNER/REPO: a system that `driveinsight train` wrote",
         version=1,
         argument="weights",
         data_files=POLICY_FILES,

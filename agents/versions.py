@@ -14,7 +14,8 @@ from contextlib import suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-from agents import AGENTS, SCHEMES, AgentEntry, named, place_and_options
+from agents import AGENTS, POLICY_FILES, SCHEMES, AgentEntry, named, place_and_options
+from agents.hub import local_folder
 from agents.ownership import module_named
 
 
@@ -39,7 +40,9 @@ def agent_version(spec: str) -> str:
     if scheme in SCHEMES:
         path, options = place_and_options(spec, place)
         said = [part for value in options.values() for part in value.split(",")]
-        return _declared(scheme, SCHEMES[scheme], [Path(part) for part in (path, *said)])
+        entry = SCHEMES[scheme]
+        found = local_folder(path) if entry.data_files == POLICY_FILES else Path(path)
+        return _declared(scheme, entry, [found, *map(Path, said)])
     return f"file {_hash([_code_of(spec.rpartition(':')[0])])}"
 
 

@@ -21,6 +21,8 @@ OK, NOTE, WRONG = "ok", "note", "WRONG"
 # Extras by a package of each, and what they are for
 EXTRAS = {
     "policy": ("torch", "the paper's policy, training and explaining"),
+    "hub": ("huggingface_hub", "policies from the Hugging Face Hub and to it"),
+    "wandb": ("wandb", "Weights & Biases, beside TensorBoard, for a training"),
     "rl": ("stable_baselines3", "models of Stable-Baselines3"),
     "interpret": ("captum", "Captum's attributions"),
     "ray": ("ray", "driving on a cluster"),

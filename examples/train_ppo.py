@@ -1,6 +1,7 @@
 """Trains PPO on single crossings from the prompt, and saves a model that the leaderboard scores.
 
     python examples/train_ppo.py                     # writes ppo.zip and ppo.monitor.csv
+    tensorboard --logdir ppo.tensorboard             # while it learns, where it is installed
     driveinsight evaluate --agent sb3:ppo.zip --suite town05_tiny --trust
 
 It needs Stable-Baselines3: `pip install -c constraints.txt -e ".[rl]"`. Seeds of training begin at
@@ -22,6 +23,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 import di_envs  # noqa: F401 (registers the ids)
+from agents.training.board import Tell, board
 from wrappers.actions import pedal_vector
 from wrappers.prompt_features import KEYS, PromptFeatures
 from wrappers.sb3 import Sb3VecEnv
@@ -55,6 +57,9 @@ class Training:
 
     traffic: int = 120
     """Number of other vehicles."""
+
+    wandb: str = ""
+    """Project of Weights & Biases that is told how it goes, beside TensorBoard; empty for none."""
 
 
 def make_worlds(training: Training) -> VecNormalize:
@@ -109,6 +114,10 @@ def falling(start: float) -> Callable[[float], float]:
 class Bar(BaseCallback):
     """Shows how far training is, and how well the last hundred episodes were driven."""
 
+    def __init__(self, tell: Tell) -> None:
+        super().__init__()
+        self._tell = tell
+
     def _on_training_start(self) -> None:
         self._bar = Progress()
         self._bar.start()
@@ -120,6 +129,9 @@ class Bar(BaseCallback):
     def _on_rollout_end(self) -> None:
         scores = [episode["driving_score"] for episode in self.model.ep_info_buffer or ()]
         text = f"DS {sum(scores) / len(scores):.1f}" if scores else ""
+        losses = {name: float(x) for name, x in self.logger.name_to_value.items()}
+        driven = {"driving_score": sum(scores) / len(scores)} if scores else {}
+        self._tell({"step": self.num_timesteps, **losses, **driven})
         self._bar.update(self._task, completed=self.num_timesteps, description=f"training {text}")
 
     def _on_training_end(self) -> None:
@@ -131,7 +143,9 @@ def main(training: Training) -> None:
     torch.set_num_threads(training.threads)
     worlds = make_worlds(training)
     learner = make_learner(worlds, training)
-    learner.learn(training.steps, callback=Bar())
+    place = training.model.with_suffix(".tensorboard")
+    with board(place, project=training.wandb, about=vars(training)) as tell:
+        learner.learn(training.steps, callback=Bar(tell))
     learner.save(training.model)
     worlds.close()
     print(f"Written: {training.model} and {training.model.with_suffix('.monitor.csv')}")

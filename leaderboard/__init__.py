@@ -25,7 +25,9 @@ _OFFERED = {
     "compare": "leaderboard.api.comparisons",
     "evaluate": "leaderboard.api.runs",
     "explain": "leaderboard.api.pages",
+    "from_pretrained": "agents.zoo.pretrained",
     "load_run": "leaderboard.api.runs",
+    "push_to_hub": "agents.zoo.pretrained",
     "report": "leaderboard.api.pages",
 }
 

@@ -51,7 +51,7 @@ def blocks(text, language):
 def shell_commands(program, page=README):
     """The command lines of a page that run a program, without their comments."""
     for block in blocks(page, "sh"):
-        for line in block.splitlines():
+        for line in block.replace("\\\n", " ").splitlines():
             for part in line.split("&&"):
                 words = shlex.split(part, comments=True)
                 if words and words[0].rpartition("/")[2] == program:
@@ -196,6 +196,13 @@ def test_the_readmes_commands_parse_and_name_what_there_is():
             name = command.agent.rpartition(":")[0]
             assert command.agent in AGENTS or (TOP / name).is_file(), command.agent
             assert command.suite in suite_names() or (command.town and command.routes)
+
+
+def test_the_commands_of_every_page_parse():
+    for page in PAGES:
+        for words in shell_commands("driveinsight", page.read_text(encoding="utf-8")):
+            if "..." not in words and not words[0].startswith("--"):
+                tyro.cli(Command, args=words)
 
 
 def test_the_commands_of_the_page_on_training_parse_and_name_configurations_there_are():

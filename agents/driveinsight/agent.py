@@ -23,6 +23,7 @@ from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
 from agents.driveinsight.weights import WeightsError, from_pretrained
+from agents.hub import HubError, local_folder
 from agents.networks.fused import fuse_norms
 from agents.networks.taps import editing
 from agents.one_thread import one_thread
@@ -61,7 +62,8 @@ class DriveInsightAgent:
     """Drives with a trained policy.
 
     Args:
-        weights: Folder of a policy, see `weights.save_pretrained`; None for a shipped one.
+        weights: Folder of a policy, see `weights.save_pretrained`, or `hf:OWNER/REPO`; None for a
+            shipped one.
         shipped: Name of that one.
 
     Raises:
@@ -69,7 +71,7 @@ class DriveInsightAgent:
     """
 
     def __init__(self, *, weights: str | Path | None = None, shipped: str = "driveinsight") -> None:
-        self.policy = _policy(shipped, SHIPPED / shipped if weights is None else Path(weights))
+        self.policy = _policy(shipped, SHIPPED / shipped if weights is None else weights)
         self.requires = requirements_of(self.policy.config)
         self._controller = WaypointControllerConfig(
             waypoint_dt_s=self.policy.config.planner.waypoint_dt_s
@@ -162,15 +164,15 @@ def requirements_of(config: PolicyConfig) -> Requirements:
     )
 
 
-def _policy(name: str, folder: Path) -> Policy:
-    if folder == SHIPPED / name and not folder.is_dir():
+def _policy(name: str, place: str | Path) -> Policy:
+    if place == SHIPPED / name and not (SHIPPED / name).is_dir():
         raise AgentSpecError(
             f"agent '{name}': this version comes without its weights. Train some (docs/training.md "
             f"says how) and name their folder: driveinsight:runs/{name}/policy"
         )
     try:
-        policy = from_pretrained(folder)
-    except WeightsError as error:
+        policy = from_pretrained(local_folder(place))
+    except (WeightsError, HubError) as error:
         raise AgentSpecError(f"agent 'driveinsight': {error}") from error
     fuse_norms(policy)
     return policy

@@ -16,6 +16,7 @@ import torch
 from safetensors import SafetensorError
 from torch import Tensor, nn
 
+from agents.hub import with_metadata
 from di_envs.files.json_values import JsonError, indented, read_json
 from di_envs.files.whole import write_whole
 
@@ -41,7 +42,7 @@ def save_network(network: nn.Module, content: Mapping[str, Any], folder: Path, c
         WeightsError: If a weight is no number that float16 holds.
     """
     write_whole(folder / CONFIG_FILE, indented(content))
-    write_whole(folder / CARD_FILE, card)
+    write_whole(folder / CARD_FILE, with_metadata(card))
     weights = {name: _halved(name, value) for name, value in network.state_dict().items()}
     write_whole(folder / WEIGHTS_FILE, safetensors.torch.save(weights))
 

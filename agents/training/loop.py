@@ -10,6 +10,7 @@ from typing import Any
 
 from torch import nn
 
+from agents.training.board import BOARD_FOLDER, Tell, board
 from agents.training.learning import Training
 from agents.training.log import append_row, forget_rows_after, read_rows
 from agents.training.model_card import model_card
@@ -46,6 +47,7 @@ def train(
     stop: Callable[[], bool] = lambda: False,
     checks: Checks | None = None,
     about_data: Mapping[str, Any] | None = None,
+    wandb: str = "",
 ) -> bool:
     """Trains to the last step; writes checkpoints, a log and the policy on the way.
 
@@ -57,6 +59,7 @@ def train(
         stop: Asked after each step whether to stop; a checkpoint is written then.
         checks: Drives now and then; the best policy is kept. None keeps the last one.
         about_data: The data card, for the model card.
+        wandb: Project of Weights & Biases that is told what the log is; empty for none.
 
     Returns:
         Whether the last step was done.
@@ -64,18 +67,30 @@ def train(
     Raises:
         TrainingError: If the loss is not finite.
     """
-    loop = _Loop(
-        training=training, data=data, folder=folder, checks=checks, about_data=about_data or {}
-    )
-    loop.begin()
-    while loop.checked():
-        if loop.last_is_done or training.team.any(stop()):
-            loop.end()
-            break
-        terms = loop.step()
-        on_step(training.step, terms)
-        loop.log()
-    return loop.last_is_done and not loop.left
+    with board(
+        folder / BOARD_FOLDER,
+        first_step=training.step + 1,
+        project=wandb,
+        about=training.config.to_mapping(),
+        told=training.team.first,
+    ) as tell:
+        loop = _Loop(
+            training=training,
+            data=data,
+            folder=folder,
+            checks=checks,
+            about_data=about_data or {},
+            tell=tell,
+        )
+        loop.begin()
+        while loop.checked():
+            if loop.last_is_done or training.team.any(stop()):
+                loop.end()
+                break
+            terms = loop.step()
+            on_step(training.step, terms)
+            loop.log()
+        return loop.last_is_done and not loop.left
 
 
 @dataclass(kw_only=True)
@@ -83,6 +98,7 @@ class _Loop:
     """The steps of a training, and what is written between them.
 
     Attributes:
+        tell: Takes the rows of the log for boards that people watch.
         left: Whether a check was left, as it was asked to stop.
         sums: By loss term, over the steps since the last row of the log.
         count: Of these steps.
@@ -94,6 +110,7 @@ class _Loop:
     folder: Path
     checks: Checks | None
     about_data: Mapping[str, Any]
+    tell: Tell
     left: bool = False
     sums: dict[str, float] = field(default_factory=dict)
     count: int = 0
@@ -136,6 +153,7 @@ class _Loop:
         row = self._row()
         if self.training.team.first:
             append_row(self.folder / LOG_FILE, row)
+            self.tell(row)
         if time.monotonic() - self.saved_s > CHECKPOINT_EVERY_S:
             self.save()
             self.saved_s = time.monotonic()
@@ -176,6 +194,8 @@ class _Loop:
         if found is None:
             return False
         append_row(self.folder / CHECKS_FILE, {"step": self.training.step, **found})
+        checked = {f"check/{name}": value for name, value in found.items()}
+        self.tell({"step": self.training.step, **checked})
         if found["driving_score"] >= max(before, default=0.0):
             self._keep()
         return True

@@ -27,6 +27,7 @@ from agents.driveinsight.perception_losses import (
     perception_losses,
 )
 from agents.driveinsight.weights import save_pretrained
+from agents.training.board import BOARD_FOLDER, Tell, board
 from agents.training.checkpoints import load_checkpoint, rate_at, save_checkpoint
 from agents.training.config import TrainingError
 from agents.training.loading import load_moments, rendered
@@ -217,8 +218,9 @@ def perceive(
     sequences = Sequences(policy.config, config, chosen)
     numbers = order(config, training.step)
     batches = rendered(sequences, config.batch, numbers, joined, workers=workers)
-    with closing(batches):
-        _learn(training, batches, folder, tell, stop)
+    watched = board(folder / BOARD_FOLDER, first_step=training.step + 1)
+    with closing(batches), watched as told:
+        _learn(training, batches, folder, tell, stop, told)
     training.save(checkpoint)
     if training.step < config.steps:
         return False
@@ -233,6 +235,7 @@ def _learn(
     folder: Path,
     tell: Callable[[int, Mapping[str, float]], None],
     stop: Callable[[], bool],
+    told: Tell,
 ) -> None:
     """Steps until the last one, or until it is asked to stop; writes the log and checkpoints."""
     config = training.config
@@ -247,7 +250,9 @@ def _learn(
             continue
         found = training.measure(batches) if measured else dict.fromkeys(figures({}))
         row = {name: value / count for name, value in sums.items()}
-        append_row(folder / LOG_FILE, {"step": training.step, **row, **found})
+        whole = {"step": training.step, **row, **found}
+        append_row(folder / LOG_FILE, whole)
+        told(whole)
         sums, count = Counter[str](), 0
         # together with a row, so that rows are the same however often a run is cut
         if time.monotonic() - saved_s > CHECKPOINT_EVERY_S:

@@ -20,7 +20,7 @@ from agents.driveinsight.agent import requirements_of
 from agents.driveinsight.config import CONFIGS, TOKENS, PolicyConfig
 from agents.driveinsight.losses import counts, losses
 from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import from_pretrained, save_pretrained
+from agents.driveinsight.weights import save_pretrained
 from agents.networks.weights import take_tensors
 from agents.training.config import TrainConfig
 from agents.training.frames import DriveStage, RecordedDrive
@@ -37,7 +37,7 @@ from agents.training.samples import (
 from agents.zoo.inputs import inputs_of
 from agents.zoo.registry import config_from, config_of, network_of, system_names
 from agents.zoo.system import Output, SystemConfig, SystemModel
-from agents.zoo.weights import holds_system, load_system, save_system
+from agents.zoo.weights import holds_system, load_network, save_system
 from di_envs.config import check_name
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -112,7 +112,7 @@ class Trainee(ABC):
         self, network: nn.Module, folder: Path, *, only: str = ""
     ) -> tuple[list[str], list[str]]:
         """Takes over tensors of what a folder holds, whose names begin so; see `take_tensors`."""
-        other = load_system(folder) if holds_system(folder) else from_pretrained(folder)
+        other = load_network(folder)
         state = other.state_dict()
         theirs = {name: value for name, value in state.items() if name.startswith(only)}
         return take_tensors(network, theirs, folder)

@@ -20,6 +20,7 @@ from agents import AGENTS, AgentSpecError
 from agents.base import Control, Observation, make_control
 from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
 from agents.explain.protocol import Anatomy
+from agents.hub import HubError, local_folder
 from agents.networks.fused import fuse_norms
 from agents.networks.taps import editing
 from agents.networks.weights import WeightsError
@@ -60,7 +61,8 @@ class SystemAgent:
     """Drives with a trained system.
 
     Args:
-        weights: Folder of a system that `driveinsight train` wrote; None for the shipped one.
+        weights: Folder of a system that `driveinsight train` wrote, or `hf:OWNER/REPO`; None for
+            the shipped one.
         shipped: Name of that one in the table of agents.
         rules: `on` drives with the controller and rules that were published with it, `off` with the
             controller that all policies of this project share, and nothing else.
@@ -79,8 +81,7 @@ class SystemAgent:
             check_name(rules, ("on", "off"), "value of rules")
         except ValueError as error:
             raise AgentSpecError(f"agent '{shipped}': {error}") from error
-        folder = _shipped(shipped) if weights is None else Path(weights)
-        self.network = _network(shipped, folder)
+        self.network = _network(shipped, _shipped(shipped) if weights is None else weights)
         self.requires = self.network.config.requires
         self.rules = rules == "on"
         self._edits: tuple[TapEdit, ...] = ()
@@ -188,10 +189,10 @@ def _shipped(name: str) -> Path:
     return folder
 
 
-def _network(name: str, folder: Path) -> SystemModel:
+def _network(name: str, place: str | Path) -> SystemModel:
     try:
-        network = load_system(folder)
-    except WeightsError as error:
+        network = load_system(local_folder(place))
+    except (WeightsError, HubError) as error:
         raise AgentSpecError(f"agent '{name}': {error}") from error
     fuse_norms(network)
     return network

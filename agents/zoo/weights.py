@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from agents.driveinsight.model import Policy
+from agents.driveinsight.weights import from_pretrained as load_policy
 from agents.networks.weights import (
     CONFIG_FILE,
     WeightsError,
@@ -40,6 +42,15 @@ def load_system(folder: Path) -> SystemModel:
     network = network_of(config)
     load_strictly(network, folder, config.name)
     return network.eval()
+
+
+def load_network(folder: Path) -> Policy | SystemModel:
+    """The network of a folder, whichever kind it is, on the CPU, ready to drive.
+
+    Raises:
+        WeightsError: As the two it chooses from.
+    """
+    return load_system(folder) if holds_system(folder) else load_policy(folder)
 
 
 def holds_system(folder: Path) -> bool:

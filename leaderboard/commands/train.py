@@ -128,6 +128,10 @@ class Train:
     ] = "auto"
     """Of products and convolutions; auto takes bfloat16 where the hardware has it built in."""
 
+    wandb: Annotated[str | None, says("PROJECT", "none")] = None
+    """Project of Weights & Biases that is told what the log is (extra wandb). TensorBoard, where it
+    is installed, finds the same in --output."""
+
     def run(self) -> int:
         """Trains; returns the exit code."""
         try:
@@ -163,7 +167,11 @@ class Train:
         try:
             with interruptible(ends_process=True):
                 session, done = run_training(
-                    self._plan(), check, console=console, on_begin=_tell_beginning
+                    self._plan(),
+                    check,
+                    console=console,
+                    on_begin=_tell_beginning,
+                    wandb=self.wandb or "",
                 )
         except (TrainingError, DriveFileError, WeightsError, CheckError, OSError) as error:
             raise UsageError(str(error)) from error

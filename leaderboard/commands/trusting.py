@@ -30,13 +30,19 @@ def trusted_run(run: RunRecord, *, agent: str | None, trust: bool) -> RunRecord:
         trust: Whether the user trusts what the folder names.
 
     Raises:
-        UsageError: If it would run code of others, and nobody said that it may; names it.
+        UsageError: If it would run code of others or fetch something, and nobody said that it may.
     """
+    from agents.hub import is_on_hub
     from agents.ownership import code_of_others
     from leaderboard.replaying.recorded_edits import code_of_edits
 
     if agent is not None:
         check_model(agent, trust=trust)
+    if agent is None and not trust and is_on_hub(run.agent):
+        raise UsageError(
+            f"this would fetch the agent '{run.agent}' from the Hub, as the results folder asks: "
+            "if that is meant, add --trust, or name it with --agent"
+        )
     found = [] if agent is not None else [code_of_others(run.agent)]
     kept = [run.interventions, *(record.interventions for record in run.routes)]
     found += code_of_edits(text for texts in kept for text in texts)

@@ -39,6 +39,7 @@ def run_training(
     *,
     console: Console,
     on_begin: Callable[[Session], None] = lambda session: None,
+    wandb: str = "",
 ) -> tuple[Session, bool]:
     """Trains to the last step, or until it is asked to stop.
 
@@ -47,6 +48,7 @@ def run_training(
         check: When it is checked.
         console: Where progress is shown.
         on_begin: Told how it begins, before the first step.
+        wandb: Project of Weights & Biases that is told of it; empty for none.
 
     Returns:
         The session, and whether the last step was done.
@@ -63,10 +65,10 @@ def run_training(
         on_begin(session)
         with compile_progress(console):
             session.warm_up()
-        return session, _watched(session, check)
+        return session, _watched(session, check, wandb)
 
 
-def _watched(session: Session, check: CheckPlan) -> bool:
+def _watched(session: Session, check: CheckPlan, wandb: str) -> bool:
     """Trains under a bar; returns whether the last step was done."""
     training, data = session.training, session.batches()
     config = training.config
@@ -85,6 +87,7 @@ def _watched(session: Session, check: CheckPlan) -> bool:
                 stop=stop,
                 checks=checks,
                 about_data=session.about_data(),
+                wandb=wandb,
             )
 
 

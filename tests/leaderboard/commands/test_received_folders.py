@@ -70,6 +70,13 @@ def test_an_agent_that_a_folder_names_is_not_run_but_named(command, agent, here,
     assert not Path("ran").exists()
 
 
+@pytest.mark.parametrize("command", ["branch", "explain", "respond"])
+def test_a_folder_has_nothing_fetched_from_the_hub(command, here, capsys):
+    received(agent="driveinsight:hf:me/mine")
+    assert main(COMMANDS[command]) == 2
+    assert "would fetch the agent 'driveinsight:hf:me/mine'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_edits_that_a_folder_names_are_not_run_but_named(command, here, capsys):
     received(interventions=("package.inner.Mine:speed",))
