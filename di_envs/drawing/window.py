@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
 from typing import Any
 
@@ -12,6 +14,16 @@ _NO_DISPLAY = (
     "There is no display to open a window on ({reason}). Use render_mode='rgb_array' for frames, "
     "`driveinsight drive --video FILE` for a video, or a virtual display (`xvfb-run python …`)."
 )
+
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # by which a desktop says where it is
+
+
+def display_is_likely() -> bool:
+    """Whether a window could open, as far as can be told without trying: it loads no pygame."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    driver = os.environ.get("SDL_VIDEODRIVER", "")
+    return (bool(driver) and driver != "offscreen") or any(map(os.environ.get, _DISPLAYS))
 
 
 class Window:
