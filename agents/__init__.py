@@ -224,7 +224,7 @@ SCHEMES: dict[str, AgentEntry] = {
         entry_point="agents.sb3.agent:Sb3Agent",
         summary="sb3:FILE.zip[?control_dt_s=0.2]: a model of Stable-Baselines3 or sb3-contrib",
         version=1,
-        packages=("stable-baselines3", "torch"),
+        packages=("sb3-contrib", "stable-baselines3", "torch"),
     ),
 }
 

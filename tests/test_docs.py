@@ -177,7 +177,7 @@ def learned(code, folder):
     for name in sorted(set(re.findall(r"^(?:from|import) (\w+)", code, flags=re.MULTILINE))):
         if name not in PACKAGES:
             pytest.importorskip(name, reason=f"docs/learning.md says how to install {name}")
-    short = code.replace("20_000", "512").replace("60, 4_000", "2, 20")
+    short = re.sub(r"\b(8_192|4_096|2_048)\b", "512", code).replace("2_000, 30", "20, 2")
     assert short != code, "the example does not say how long it trains"
     (folder / "learner.py").write_text(short, encoding="utf-8")
     done = subprocess.run(
