@@ -47,7 +47,7 @@ def trained(code: str, folder: Path) -> float | None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "learner.py").write_text(code, encoding="utf-8")
     before = getrusage(RUSAGE_CHILDREN)
-    paths = {"PYTHONPATH": str(TOP), "MINARI_DATASETS_PATH": str(folder.resolve() / "data")}
+    paths = {"PYTHONPATH": str(TOP)}
     with (folder / "output.txt").open("w", encoding="utf-8") as output:
         done = subprocess.run(
             [sys.executable, "learner.py"],
