@@ -211,16 +211,3 @@ def test_an_option_of_other_environments_is_what_python_calls_a_type_error():
         gymnasium.make(TOY, frameskip=1)
     with pytest.raises(UnknownOptionError, match="known: suite"):
         gymnasium.make_vec(TOY, num_envs=2, frameskip=1)
-
-
-def test_torchrl_makes_one_by_its_id():
-    envs = pytest.importorskip("torchrl.envs", reason="docs/learning.md says how to install it")
-    env = envs.GymEnv(TOY, preset="flat", **QUIET)
-    assert env.rollout(2)["observation"].shape == (2, 364)
-
-
-def test_skrl_takes_boxes():
-    wrappers = pytest.importorskip("skrl.envs.wrappers.torch", reason="see docs/learning.md")
-    env = wrappers.wrap_env(gymnasium.make_vec(TOY, num_envs=2, preset="box", **QUIET))
-    observation, _ = env.reset()
-    assert observation.shape[0] == 2
