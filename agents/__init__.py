@@ -235,9 +235,9 @@ SCHEMES: dict[str, AgentEntry] = {
     ),
     "sb3": AgentEntry(
         entry_point="agents.sb3.agent:Sb3Agent",
-        summary="sb3:FILE.zip[?control_dt_s=0.2]: a model that Stable-Baselines3 saved",
+        summary="sb3:FILE.zip[?control_dt_s=0.2]: a model of Stable-Baselines3 or sb3-contrib",
         version=1,
-        packages=("stable-baselines3", "torch"),
+        packages=("sb3-contrib", "stable-baselines3", "torch"),
     ),
 }
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+from di_envs.config import PRESETS
 from di_envs.files.json_values import from_json, to_json
-from di_envs.files.names import name_hint
+from di_envs.files.names import check_name, name_hint
 from di_envs.files.text_enum import TextEnum
 from di_envs.sensors.camera.config import Rig
 from di_envs.sensors.lidar.config import LidarConfig
@@ -57,10 +58,13 @@ class Requirements:
     options: Mapping[str, Any] = field(default_factory=dict)  # of `SENSOR_OPTIONS`
     hd_map: bool = False  # True: the static `Town` is in the observation under the key `town`
     branchable: bool = True  # False for an agent that hides memory outside its `Memory`
+    preset: str = ""  # in which it learned, and makes of its observations itself; for the record
 
     def __post_init__(self) -> None:
         if not self.control_dt_s > 0.0:
             raise ValueError(f"control_dt_s must be positive, not {self.control_dt_s}")
+        if self.preset:
+            check_name(self.preset, PRESETS, "preset")
         for name in self.options:
             if name not in SENSOR_OPTIONS:
                 raise ValueError(
@@ -84,6 +88,7 @@ class Requirements:
                 options=dict(asked.options),
                 hd_map=bool(asked.hd_map),
                 branchable=bool(asked.branchable),
+                preset=str(getattr(asked, "preset", "")),
             )
         except (AttributeError, TypeError) as error:
             raise ValueError(
@@ -93,6 +98,8 @@ class Requirements:
     def as_json(self) -> dict[str, Any]:
         """JSON values, for records and pipes."""
         values: dict[str, Any] = to_json(self)
+        if not self.preset:  # as in records from before there were any
+            del values["preset"]
         return values
 
     @classmethod
@@ -102,6 +109,8 @@ class Requirements:
         Raises:
             ValueError: If they are no requirements, or ask for what they may not.
         """
+        if isinstance(values, Mapping):
+            values = {"preset": "", **values}
         read = from_json(cls, values, "requires", complete=True)
         return dataclasses.replace(read, options=sensors_of_json(read.options))
 

@@ -9,7 +9,9 @@ from typing import Any
 
 from typing_extensions import Self
 
+from di_envs.files.names import LONGEST_NAME, name_hint
 from di_envs.files.names import check_name as check_name  # from here, too
+from di_envs.files.plain_text import one_plain_line
 from di_envs.rules import RULES
 from di_envs.sensors.camera.config import Rig, rig_of
 from di_envs.sensors.geo_origin import checked_origin
@@ -31,6 +33,9 @@ OBSERVATION_GROUPS = (
 OBSERVATION_PRESETS: dict[str, dict[str, Any]] = {
     "rl": {"observations": ("prompt", "camera"), "cameras": "rl"}
 }
+
+# Forms of observations for learning libraries, see `di_envs.presets`.
+PRESETS = ("box", "flat")
 
 # Names of CARLA's presets (carla.WeatherParameters), the fourteen of the Leaderboard first.
 WEATHERS = (
@@ -61,6 +66,14 @@ WEATHERS = (
 ROUTE_WEATHER = "route"  # in place of one: what the route file says
 
 
+class UnknownOptionError(TypeError, ValueError):
+    """An option that there is not: a wrong value for us, and what Python calls a TypeError.
+
+    Libraries that try an option of other environments, as TorchRL does `frameskip`, expect what
+    Python says of an argument that a function lacks.
+    """
+
+
 @dataclass(frozen=True, kw_only=True)
 class RouteEnvConfig:
     """Options of a `RouteEnv`. None stands for what the suite says.
@@ -80,6 +93,8 @@ class RouteEnvConfig:
             `radar`, `proximity`. Each camera
             costs its time, so name what is needed: `("prompt",)` alone steps many times faster.
             Or the name of a preset: `rl` is the prompt and the rig `rl`, one camera of 84 x 84.
+        preset: In which form they come: `box`, every entry a Box; `flat`, one vector; None, as they
+            are. See `di_envs.presets`.
         traffic: Number of other vehicles; without a suite that says it, by the length of lanes.
         walkers: Number of walkers; likewise.
         weather: Name of one of CARLA's weather presets, or `route`: what the route file says, which
@@ -106,6 +121,7 @@ class RouteEnvConfig:
     signals: str | None = None
     scenarios: str | None = None
     observations: tuple[str, ...] = ("camera", "lidar", "prompt")
+    preset: str | None = None
     traffic: int | None = None
     walkers: int | None = None
     weather: str | None = None
@@ -146,6 +162,11 @@ class RouteEnvConfig:
             return
         if self.observations in OBSERVATION_GROUPS:
             return  # refused below, with the tuple that was meant
+        if self.observations in PRESETS:
+            raise ValueError(
+                f"observations says what is seen, preset in which form: "
+                f"observations=('prompt',), preset={self.observations!r}."
+            )
         check_name(self.observations, OBSERVATION_PRESETS, "preset of observations")
         preset = OBSERVATION_PRESETS[self.observations]
         default = type(self).cameras
@@ -171,6 +192,13 @@ class RouteEnvConfig:
             raise ValueError(f"observations is empty; known: {', '.join(OBSERVATION_GROUPS)}.")
         for group in self.observations:
             check_name(group, OBSERVATION_GROUPS, "observation group")
+        if self.preset is not None:
+            check_name(self.preset, PRESETS, "preset")
+        if self.preset == "flat" and "camera" in self.observations:
+            raise ValueError(
+                "preset='flat' is one vector, which images do not go into: take preset='box', or "
+                "observations without 'camera', such as ('prompt',)."
+            )
         for event in self.terminate_on:
             check_name(event, EVENT_KEYS.values(), "event in terminate_on")
         if self.weather is not None:
@@ -195,11 +223,17 @@ class RouteEnvConfig:
         """A config of named options.
 
         Raises:
-            ValueError: If an option is not known (with a suggestion), or a value is refused.
+            UnknownOptionError: If an option is not known; with a suggestion.
+            ValueError: If a value is refused.
         """
         known = [field.name for field in dataclasses.fields(cls)]
         for option in values:
-            check_name(option, known, "RouteEnv option")
+            if option not in known:
+                shown = one_plain_line(repr(option), LONGEST_NAME)
+                raise UnknownOptionError(
+                    f"RouteEnv got an unexpected keyword argument {shown}; "
+                    f"{name_hint(option, known)}."
+                )
         return cls(**values)
 
     def changes(self) -> dict[str, Any]:

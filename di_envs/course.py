@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from di_envs.config import ROUTE_WEATHER, RouteEnvConfig, check_name
 from di_envs.observation import observation_space
 from di_envs.observer import Observer
 from di_envs.planned_routes import PlannedRoutes
+from di_envs.presets import Form
 from di_envs.reward import (
     Standing,
     infraction_penalty,
@@ -92,8 +94,13 @@ class Course:
         """What cameras see at the start of an episode."""
         return self.config.weather or "ClearNoon"
 
-    def observation_space(self) -> spaces.Dict:
-        """The space of what an ego sees."""
+    @cached_property
+    def form(self) -> Form:
+        """In which an environment shows what an ego sees."""
+        return Form(self.seen_space(), self.config.preset)
+
+    def seen_space(self) -> spaces.Dict:
+        """The space of what an ego sees, whatever the form."""
         config = self.config
         return observation_space(
             config.observations,

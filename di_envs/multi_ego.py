@@ -23,7 +23,7 @@ from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import check_name
 from di_envs.copying import Copyable
 from di_envs.course import load_course
-from di_envs.drawing.screen import Screen, check_render_mode
+from di_envs.drawing.screen import Screen, check_render_mode, render_modes
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.reward import standing_of
 from di_envs.town.plan import RoutePlan
@@ -90,12 +90,16 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
                 f"{', '.join(course.route_ids)}."
             )
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
+        self.metadata = {
+            **self.metadata,
+            "render_modes": render_modes(render_mode),
+            "render_fps": round(1.0 / self.config.control_dt_s),
+        }
         self._screen = None if render_mode is None else Screen(course, render_mode)
         self.world = World(course.town, course.world_config)
         self.possible_agents = [f"ego_{ego}" for ego in range(egos)]
         self.agents: list[str] = []
-        space = course.observation_space()
+        space = course.form.space
         self._observation_spaces = {name: copy.deepcopy(space) for name in self.possible_agents}
         self._action_spaces = {name: action_space() for name in self.possible_agents}
         first = course.observer()
@@ -103,7 +107,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         self._np_random, _ = seeding.np_random(None)
         self._remember({"egos": egos, "render_mode": render_mode, **options}, before)
 
-    def observation_space(self, agent: str) -> spaces.Dict:
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
         """The space of one ego's observations; always the same object."""
         return self._observation_spaces[self._known(agent)]
 
@@ -154,7 +158,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         observations = self._observe()
         if self.render_mode == "human":
             self._draw(self.agents[0], observations)
-        return observations, infos
+        return self._shown(observations), infos
 
     def step(self, actions: Mapping[str, Any]) -> Steps:
         """Holds each ego's action for `control_dt_s`.
@@ -187,7 +191,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
             if terminated[name] or truncated[name]:
                 self.world.remove_actor(ego)
                 self.agents.remove(name)
-        return observations, rewards, terminated, truncated, infos
+        return self._shown(observations), rewards, terminated, truncated, infos
 
     def render(self, agent: str | None = None) -> Any:
         """A picture (H, W, 3) uint8 around an ego; None unless the mode is `rgb_array`.
@@ -246,6 +250,9 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         self.agents = [
             name for name, there in zip(self.possible_agents, here, strict=True) if there
         ]
+
+    def _shown(self, observations: Mapping[str, Observation]) -> dict[str, Any]:
+        return {name: self._course.form.of(seen) for name, seen in observations.items()}
 
     def _observe(self) -> dict[str, Observation]:
         return {name: self._observers[ego].observe() for name, ego in self._driving().items()}

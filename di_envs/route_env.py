@@ -9,16 +9,18 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from typing_extensions import Self
 
 from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
 from di_envs.copying import Copyable
 from di_envs.course import load_course
-from di_envs.drawing.screen import Screen, check_render_mode
+from di_envs.drawing.screen import Screen, check_render_mode, render_modes
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.observer import Observer
 from di_envs.planned_routes import PlannedRoutes
+from di_envs.presets import Form
 from di_envs.reward import Standing, standing_of
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, Snapshot, World, WorldView
@@ -94,11 +96,15 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._course = course = load_course(options, cached=cached)
         self.config, self.plans = course.config, course.plans
         self.world = World(course.town, course.world_config)
-        self.observation_space = course.observation_space()
+        self.observation_space = course.form.space
         self.action_space = action_space()
         self._observer = course.observer()
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
+        self.metadata = {
+            **self.metadata,
+            "render_modes": render_modes(render_mode),
+            "render_fps": round(1.0 / self.config.control_dt_s),
+        }
         self._screen = None if render_mode is None else Screen(course, render_mode)
         self._begun = False
         self._over = True
@@ -139,6 +145,15 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         Raises:
             ValueError: If the seed is too large, or an option or the route is unknown.
         """
+        observation, info = self.begin(seed=seed, options=options)
+        if self.render_mode == "human":
+            self._draw(observation)
+        return self._course.form.of(observation), info
+
+    def begin(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Observation, Info]:
+        """The first part of a reset: all of it but the form in which the observation is shown."""
         if seed is not None and seed >= _SEED_LIMIT:
             raise ValueError(f"A seed is a whole number from 0 to 2**63 - 1; got {seed}.")
         super().reset(seed=seed)
@@ -150,10 +165,7 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         self._observer.start(self.view)
         standing = standing_of(self.view.state, _EGO)
         info = self._course.info(self.view, _EGO, standing, standing, ())
-        observation = self._observer.observe()
-        if self.render_mode == "human":
-            self._draw(observation)
-        return observation, info
+        return self._observer.observe(), info
 
     def step(self, action: np.ndarray[Any, Any]) -> tuple[Observation, float, bool, bool, Info]:
         """Holds an action for `control_dt_s`.
@@ -171,7 +183,7 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         observation = self._observer.observe()
         if self.render_mode == "human":
             self._draw(observation)
-        return observation, *outcome
+        return self._course.form.of(observation), *outcome
 
     def hold(self, control: np.ndarray[Any, Any]) -> Standing:
         """The first part of a step: holds a checked action; `world.run` is the second.
@@ -215,7 +227,7 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
 
         Whoever has just been given one, as when filming, so spares a second look.
         """
-        return self._draw(observation)
+        return self._draw(observation if isinstance(observation, Mapping) else {})
 
     def close(self) -> None:
         """Closes the window, if there is one."""
@@ -225,7 +237,7 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     def observe(self) -> Observation:
         """The present observation once more: after `restore`, for instance. Changes nothing."""
         self.view  # noqa: B018 (raises before the first reset)
-        return self._observer.observe()
+        return self._course.form.of(self._observer.observe())
 
     def change_weather(self, weather: str) -> None:
         """Changes what cameras see, until the next reset.
@@ -240,6 +252,16 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         check_name(weather, WEATHERS, "weather")
         self._observer.weather = weather
         self._observer.start(self.view)
+
+    @property
+    def form(self) -> Form:
+        """In which observations are shown."""
+        return self._course.form
+
+    @property
+    def seen_space(self) -> spaces.Dict:
+        """The space of observations as they are, whatever the form."""
+        return self._course.seen_space()
 
     @property
     def observer(self) -> Observer:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium import spaces
 from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -26,6 +25,7 @@ from typing_extensions import Self
 
 from di_envs.actions.checked import HIGH, LOW, checked_action
 from di_envs.copying import Copyable
+from di_envs.presets import Form
 from di_envs.reward import Standing
 from di_envs.route_env import Info, Observation, RouteEnv, RouteEnvSnapshot
 from di_envs.vector_rows import WorldRows, batched_infos
@@ -113,8 +113,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        assert isinstance(first.observation_space, spaces.Dict)
-        self._looks = WorldRows(first.observation_space, [env.observer for env in self.envs])
+        self._looks = self._rows_of(self.envs)
         self._limit = max_episode_steps
         self._steps = [0] * num_envs
         self._ended = np.zeros(num_envs, bool)
@@ -157,7 +156,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         for index in np.flatnonzero(~mask).tolist():
             self._looks.look(rows, index)
         self._looks.add_prompts(rows)
-        return rows, self._infos(infos, chosen)
+        return self._form.of(rows), self._infos(infos, chosen)
 
     def step(self, actions: NDArray[np.float32]) -> Steps:
         """Steps every world; those whose episode has ended are reset as `autoreset_mode` says.
@@ -195,7 +194,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         self._ended = ended[0] | ended[1]
         batched = self._restart(rows, infos) if self._restarts() else {}
         batched |= self._infos(infos, range(self.num_envs))
-        return rows, rewards, ended[0], ended[1], batched
+        return self._form.of(rows), rewards, ended[0], ended[1], batched
 
     def save_state(self) -> VectorSnapshot:
         """A value from which `restore_state` brings everything back. See `di_envs.save`."""
@@ -228,9 +227,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         twin.envs = tuple(env.twin() for env in self.envs)
         for name in self.SPACES:
             setattr(twin, name, copy.deepcopy(getattr(self, name)))
-        space = twin.single_observation_space
-        assert isinstance(space, spaces.Dict)
-        twin._looks = WorldRows(space, [env.observer for env in twin.envs])
+        twin._looks = twin._rows_of(twin.envs)
         twin._steps, twin._ended = [0] * self.num_envs, np.zeros(self.num_envs, bool)
         twin._pool = None
         return twin
@@ -240,7 +237,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         rows = self._looks.fresh()
         self._each(range(self.num_envs), lambda index: self._looks.look(rows, index))
         self._looks.add_prompts(rows)
-        return rows
+        return self._form.of(rows)
 
     def render(self) -> tuple[Any, ...]:
         """A frame of each world."""
@@ -262,13 +259,23 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         for env in self.envs:
             env.close()
 
+    @property
+    def _form(self) -> Form:
+        """In which observations are shown."""
+        return self.envs[0].form
+
+    @staticmethod
+    def _rows_of(envs: Sequence[RouteEnv]) -> WorldRows:
+        """What the worlds see, as it is, whatever the form."""
+        return WorldRows(envs[0].seen_space, [env.observer for env in envs])
+
     def _begin(
         self, index: int, seed: int | None, options: Mapping[str, Any], rows: Observation
     ) -> Info:
         """Resets a world; its observation goes to its row."""
         self._steps[index] = 0
         self._ended[index] = False
-        observation, info = self.envs[index].reset(seed=seed, options=options)
+        observation, info = self.envs[index].begin(seed=seed, options=options)
         self._looks.write(rows, index, observation)
         return info
 
@@ -289,7 +296,8 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         ended = np.flatnonzero(self._ended).tolist()
         batched: Info = {}
         for index in ended:
-            final = {"final_obs": self._looks.row(rows, index), "final_info": infos[index]}
+            last = self._form.of(self._looks.row(rows, index))
+            final = {"final_obs": last, "final_info": infos[index]}
             batched = self._add_info(batched, final, index)
         flags = self._ended.copy()
 

@@ -26,7 +26,7 @@ def vector_space(space: spaces.Space[Any]) -> spaces.Space[Any]:
     """A Box of real numbers as a vector in [-1, 1] (in [0, 1] where nothing is negative)."""
     if not _is_table(space):
         return space
-    scale = _scale_of(space)
+    scale = scale_of(space)
     low, high = ((bound / scale).ravel().astype(np.float32) for bound in (space.low, space.high))
     return spaces.Box(low, high, dtype=np.float32)
 
@@ -36,7 +36,7 @@ def _is_table(space: spaces.Space[Any]) -> TypeGuard[spaces.Box]:
     return isinstance(space, spaces.Box) and np.issubdtype(space.dtype, np.floating)
 
 
-def _scale_of(space: spaces.Box) -> NDArray[np.float64]:
+def scale_of(space: spaces.Box) -> NDArray[np.float64]:
     """What each number is divided by: the larger of its bounds, so that zero stays zero."""
     largest = np.maximum(np.abs(space.low), np.abs(space.high)).astype(np.float64)
     return np.where(largest > 0.0, largest, 1.0)
@@ -51,4 +51,4 @@ def as_vector(value: Any, space: spaces.Space[Any]) -> Any:
     """One part of an observation: a table becomes a scaled vector, others are returned as is."""
     if not _is_table(space):
         return value
-    return (np.asarray(value, np.float64) / _scale_of(space)).ravel().astype(np.float32)
+    return (np.asarray(value, np.float64) / scale_of(space)).ravel().astype(np.float32)

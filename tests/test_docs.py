@@ -16,7 +16,7 @@ import pytest
 import tyro
 
 import di_envs
-from agents import AGENTS
+from agents import AGENTS, load_agent
 from agents.base import Requirements
 from di_envs.edits.conditions import Condition
 from di_envs.edits.text import read_edits
@@ -40,6 +40,7 @@ BRANCHING = (TOP / "docs" / "branching.md").read_text(encoding="utf-8")
 AGENTS_PAGE = (TOP / "docs" / "agents.md").read_text(encoding="utf-8")
 TRAINING = (TOP / "docs" / "training.md").read_text(encoding="utf-8")
 EDITS_PAGE = (TOP / "docs" / "interventions.md").read_text(encoding="utf-8")
+LEARNING = (TOP / "docs" / "learning.md").read_text(encoding="utf-8")
 README = (TOP / "README.md").read_text(encoding="utf-8")
 CONVENTIONS = (TOP / "docs" / "conventions.md").read_text(encoding="utf-8")
 
@@ -159,6 +160,81 @@ def test_each_snippet_of_these_pages_runs_alone(page, number, tmp_path):
         env={**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, done.stderr
+
+
+LEARNERS = dict(
+    zip(
+        re.findall(r"^## (.+)\n(?:(?!^## ).*\n)*?```python", LEARNING, flags=re.MULTILINE),
+        blocks(LEARNING, "python"),
+        strict=True,
+    )
+)
+IN_CI = "Stable-Baselines3: PPO"
+
+
+def skip_without_packages(code):
+    """Skips where what an example imports of others is not here, with what is missing."""
+    lines = re.findall(r"^(?:from|import) .+", code, flags=re.MULTILINE)
+    theirs = [line for line in lines if re.split(r"[ .]", line)[1] not in PACKAGES]
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(theirs)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    if "ModuleNotFoundError" in done.stderr:
+        missing = done.stderr.strip().splitlines()[-1]
+        pytest.skip(f"{missing}; docs/learning.md says how to install it")
+
+
+def learned(code, folder):
+    """Runs an example of the page on learning, cut short; returns the agents that it wrote."""
+    short = re.sub(r"\b(8_192|4_096)\b", "512", code)
+    assert short != code, "the example does not say how long it trains"
+    (folder / "learner.py").write_text(short, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "learner.py"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=1200,
+        cwd=folder,
+        env={
+            **os.environ,
+            **{"PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"},
+        },
+    )
+    assert done.returncode == 0, done.stderr
+    models = [f"sb3:{path}" for path in sorted(folder.glob("*.zip"))]
+    return models + [f"pickled:{path}" for path in sorted(folder.glob("policies/*.pickle"))]
+
+
+def check_learner(title, folder):
+    """Asserts that an example leaves agents, before and after, that can be scored."""
+    specs = learned(LEARNERS[title], folder)
+    assert len(specs) >= 2
+    env = di_envs.RouteEnv(suite="town05_tiny", observations=("prompt",), traffic=4, walkers=0)
+    observation, _ = env.reset(seed=0)
+    controls = []
+    for spec in specs:
+        agent = load_agent(spec)
+        assert agent.requires.preset == "flat"
+        control, _ = agent.act(observation, agent.start(env.plan, 0))
+        assert control in env.action_space
+        controls.append(control.tolist())
+    assert controls[0] != controls[1]  # it has learned something
+
+
+def test_the_first_example_of_the_page_on_learning_trains_an_agent(tmp_path):
+    pytest.importorskip("stable_baselines3", reason="needs the extra rl")
+    check_learner(IN_CI, tmp_path)
+
+
+@pytest.mark.parametrize("title", [title for title in LEARNERS if title != IN_CI])
+def test_every_other_example_of_the_page_on_learning_trains_an_agent(title, tmp_path):
+    skip_without_packages(LEARNERS[title])
+    check_learner(title, tmp_path)
 
 
 def test_the_tables_of_edits_and_conditions_are_what_there_is():

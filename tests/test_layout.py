@@ -53,6 +53,7 @@ ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za
 ASKING = {
     "agents/carla/importing.py": "agents for CARLA read what its scripts say by them",
     "agents/processes.py": "Python is told by one to look for no module in the working folder",
+    "di_envs/drawing/window.py": "a desktop says by one that there is a display",
     "di_envs/files/caches.py": "who runs a container says by one where caches may be written",
     "di_envs/numerics/kernels.py": "Numba is told by one, before it loads, to keep bits equal",
     "leaderboard/running/workers/ray_engine.py": "Ray is told by one to report nobody's usage",

@@ -1,4 +1,4 @@
-"""What a model must be shown: groups, rig and LiDAR, read off its observation space."""
+"""What a model must be shown: groups, rig, LiDAR and preset, read off its observation space."""
 
 from __future__ import annotations
 
@@ -9,30 +9,37 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from agents.sb3.one_vector import Senses, described, vector_senses
 from di_envs.config import OBSERVATION_GROUPS
 from di_envs.files.names import name_hint
 from di_envs.observation import observation_space
+from di_envs.presets import as_box, box_space
 from di_envs.sensors.camera.config import RIGS
 from di_envs.sensors.lidar.config import LIDARS
-from di_envs.vectors import vector_space
+from di_envs.vectors import as_vector, vector_space
 from di_envs.world.kinds import TICK_S
 
 
 @dataclass(frozen=True, kw_only=True)
-class Senses:
-    """What a model reads of an observation.
+class _Entry:
+    """One entry of an observation, and how a model reads it: as a Box, as a vector, as both."""
 
-    Attributes:
-        groups: Observation groups that hold it.
-        options: Options of the environment that go with them: the rig, the LiDAR.
-        entries: Each entry that it reads, with its space in the environment.
-        vectors: Names of those that it reads as vectors (`di_envs.vectors`).
-    """
+    space: spaces.Space[Any]  # as the environment has it
+    boxed: bool
+    vector: bool
 
-    groups: tuple[str, ...]
-    options: Mapping[str, Any]
-    entries: Mapping[str, spaces.Space[Any]]
-    vectors: frozenset[str]
+    def read(self, value: Any) -> Any:
+        """What the model takes."""
+        space = self.space
+        if self.boxed:
+            value, space = as_box(value, space), box_space(space)
+        return as_vector(value, space) if self.vector else value
+
+    @property
+    def read_space(self) -> spaces.Space[Any]:
+        """The space of `read`."""
+        space = box_space(self.space) if self.boxed else self.space
+        return vector_space(space) if self.vector else space
 
 
 def senses_of(wanted: spaces.Space[Any], told: Mapping[str, Any]) -> Senses:
@@ -40,17 +47,33 @@ def senses_of(wanted: spaces.Space[Any], told: Mapping[str, Any]) -> Senses:
 
     Args:
         wanted: The model's observation space.
-        told: What the model says of itself: `cameras` and `lidar`, where it names them.
+        told: What the model says of itself: `cameras`, `lidar` and `preset`, where it names them.
 
     Raises:
-        ValueError: If nothing of ours fits; says which entry, what it is, and what we offer.
+        ValueError: If nothing of ours fits, or what the model says is not what its space is; says
+            which entry, what it is, and what we offer.
     """
-    if not isinstance(wanted, spaces.Dict):
+    if isinstance(wanted, spaces.Box) and len(wanted.shape) == 1:
+        senses, either = vector_senses(wanted), False
+    elif isinstance(wanted, spaces.Dict):
+        senses, either = _dict_senses(wanted, told)
+    else:
         raise ValueError(
-            f"its observation space is {type(wanted).__name__}, but ours is a Dict of entries: "
-            f"train it with MultiInputPolicy."
+            f"its observation space is {wanted}, but ours is a Dict of entries or, with "
+            f"preset='flat', one vector: train it on one of these."
         )
-    entries: dict[str, spaces.Space[Any]] = {}
+    said = str(told.get("preset", senses.preset))
+    if said != senses.preset and not (either and said == "box"):
+        raise ValueError(
+            f"it says that it was trained with preset={said!r}, but its observation space is that "
+            f"of preset={senses.preset or None!r}: correct what it says, or train it on that."
+        )
+    return Senses(groups=senses.groups, options=senses.options, preset=said, see=senses.see)
+
+
+def _dict_senses(wanted: spaces.Dict, told: Mapping[str, Any]) -> tuple[Senses, bool]:
+    """What a model of named entries reads, and whether they are the same with preset `box`."""
+    entries: dict[str, _Entry] = {}
     groups: list[str] = []
     options: dict[str, Any] = {}
     left = dict(wanted.spaces)
@@ -64,13 +87,14 @@ def senses_of(wanted: spaces.Space[Any], told: Mapping[str, Any]) -> Senses:
         entries |= offered
     if left:
         raise ValueError(_unknown(sorted(left)))
-    vectors = (name for name, space in entries.items() if not _alike(wanted[name], space))
-    return Senses(
-        groups=tuple(groups),
-        options=options,
-        entries={name: entries[name] for name in wanted.spaces},
-        vectors=frozenset(vectors),
-    )
+
+    def see(observation: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: entries[name].read(observation[name]) for name in wanted.spaces}
+
+    preset = "box" if any(entry.boxed for entry in entries.values()) else ""
+    alike = all(entry.boxed or box_space(entry.space) == entry.space for entry in entries.values())
+    senses = Senses(groups=tuple(groups), options=options, preset=preset, see=see)
+    return senses, alike
 
 
 def _offers(group: str, told: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], spaces.Dict]]:
@@ -96,27 +120,34 @@ def _names_of(group: str) -> set[str]:
 
 def _fitting(
     group: str, wanted: Mapping[str, spaces.Space[Any]], told: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, spaces.Space[Any]]]:
+) -> tuple[dict[str, Any], dict[str, _Entry]]:
     """The first offer in which every entry of a group fits."""
     complaint = ""
     for option, offer in _offers(group, told):
-        wrong = [name for name, space in wanted.items() if not _fits(space, offer.get(name))]
-        if not wrong:
-            return option, {name: offer[name] for name in wanted}
-        name = wrong[0]
+        found = {name: _entry(space, offer.get(name)) for name, space in wanted.items()}
+        fitting = {name: entry for name, entry in found.items() if entry is not None}
+        if len(fitting) == len(found):
+            return option, fitting
+        name = next(name for name in found if name not in fitting)
         which = " ".join(option.values()) or group
-        complaint += f" {which}: {_described(offer.get(name))};"
+        complaint += f" {which}: {described(offer.get(name))};"
     raise ValueError(
-        f"its observation '{name}' is {_described(wanted[name])}, which none of ours is:"
+        f"its observation '{name}' is {described(wanted[name])}, which none of ours is:"
         f"{complaint} train it on an environment of this version, with a shipped rig or LiDAR, "
-        f"and no other wrappers around the observation than VectorObservations."
+        f"with or without preset='box', and no other wrappers around the observation than "
+        f"VectorObservations."
     )
 
 
-def _fits(wanted: spaces.Space[Any], offered: spaces.Space[Any] | None) -> bool:
+def _entry(wanted: spaces.Space[Any], offered: spaces.Space[Any] | None) -> _Entry | None:
+    """How an entry must be read to fit a model, the plainest way first; None if it cannot."""
     if offered is None:
-        return False
-    return _alike(wanted, offered) or _alike(wanted, vector_space(offered))
+        return None
+    for boxed, vector in ((False, False), (False, True), (True, False), (True, True)):
+        entry = _Entry(space=offered, boxed=boxed, vector=vector)
+        if _alike(wanted, entry.read_space):
+            return entry
+    return None
 
 
 def _alike(wanted: spaces.Space[Any], offered: spaces.Space[Any]) -> bool:
@@ -129,15 +160,6 @@ def _alike(wanted: spaces.Space[Any], offered: spaces.Space[Any]) -> bool:
         return False
     height, width, channels = offered.shape
     return wanted == spaces.Box(0, 255, (channels, height, width), np.uint8)
-
-
-def _described(space: spaces.Space[Any] | None) -> str:
-    """A space in few words: a table's bounds are those of its last row."""
-    if not isinstance(space, spaces.Box):
-        return str(space)
-    low, high = (bound.reshape(-1, bound.shape[-1])[-1][:12] for bound in (space.low, space.high))
-    ends = [", ".join(f"{value:.3g}" for value in bound.tolist()) for bound in (low, high)]
-    return f"{space.shape} {space.dtype}, a row from [{ends[0]}] to [{ends[1]}]"
 
 
 def _unknown(names: list[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from di_envs.config import check_name
 from di_envs.course import Course
+from di_envs.drawing.window import Window, display_is_likely
 from di_envs.world.world import WorldView
 
 if TYPE_CHECKING:
@@ -23,6 +24,16 @@ def check_render_mode(render_mode: str | None) -> None:
     """
     if render_mode is not None:
         check_name(render_mode, RENDER_MODES, "render_mode")
+
+
+def render_modes(asked: str | None) -> list[str]:
+    """The modes that work here, for `metadata`: without a display there is no window to offer.
+
+    Args:
+        asked: The mode that the environment was made with, which is among them.
+    """
+    window = asked == "human" or display_is_likely()
+    return [mode for mode in RENDER_MODES if window or mode != "human"]
 
 
 class Screen:
@@ -46,7 +57,6 @@ class Screen:
         # here, as who renders nothing needs none of it
         from di_envs.drawing.driver_view import DriverView
         from di_envs.drawing.view import Renderer
-        from di_envs.drawing.window import Window
 
         self.window: Window | None = None
         if render_mode == "human":

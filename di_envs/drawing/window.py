@@ -5,6 +5,8 @@ It answers its own keys (P, +, -, C, Esc); which others are down is for whoever 
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -20,6 +22,16 @@ _NO_DISPLAY = (
     "There is no display to open a window on ({reason}). Use render_mode='rgb_array' for frames, "
     "`driveinsight drive --video FILE` for a video, or a virtual display (`xvfb-run python …`)."
 )
+
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # by which a desktop says where it is
+
+
+def display_is_likely() -> bool:
+    """Whether a window could open, as far as can be told without trying: it loads no pygame."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    driver = os.environ.get("SDL_VIDEODRIVER", "")
+    return (bool(driver) and driver != "offscreen") or any(map(os.environ.get, _DISPLAYS))
 
 
 class Window:

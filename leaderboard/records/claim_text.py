@@ -72,6 +72,8 @@ def asked_for(requires: Mapping[str, Any]) -> str:
         parts.append("the map")
     if requires.get("privileged"):
         parts.append("the true world")
+    if requires.get("preset"):
+        parts.append(f"in the preset {_text(requires['preset'])}")
     parts += [f"{name} {_text(value)}" for name, value in requires.get("options", {}).items()]
     if "control_dt_s" in requires:
         parts.append(f"a decision every {requires['control_dt_s']} s")

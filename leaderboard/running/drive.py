@@ -181,9 +181,9 @@ def _environment(
     spec: RunSpec, requires: Requirements, *, filmed: bool, camera: bool
 ) -> tuple[RouteEnv, Interventions]:
     """The run's environment, with the front camera where the film shows it, and the edits."""
-    own = environment_options(spec.options, requires)
-    shown = with_front_camera(own) if filmed and camera else own
     try:
+        own = environment_options(spec.options, requires)
+        shown = with_front_camera(own) if filmed and camera else own
         env = RouteEnv(render_mode="rgb_array" if filmed else None, **shown)
     except (ValueError, OSError) as error:
         raise SetupError(str(error)) from error

@@ -97,7 +97,17 @@ def _asked(place: AgentPlace) -> Requirements:
 
 
 def environment_options(options: Mapping[str, Any], requires: Requirements) -> dict[str, Any]:
-    """Environment options of a run: what the agent requires, and over it what the user says."""
+    """Environment options of a run: what the agent requires, and over it what the user says.
+
+    Raises:
+        ValueError: If the user says a preset: an agent that learned in one makes it itself, so that
+            edits of what it sees find every entry under its name.
+    """
+    if options.get("preset") is not None:
+        raise ValueError(
+            "preset is for learning; an agent that learned so says it (Requirements.preset) and "
+            "makes its own of what it is shown: leave preset out."
+        )
     return {
         **requires.options,
         "observations": requires.observations,

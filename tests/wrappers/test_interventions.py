@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from di_envs.edits.conditions import Condition
 from di_envs.edits.text import EditError
 from di_envs.observation import observation_space
+from di_envs.presets import Form
 from di_envs.prompt import COMPONENTS
 from di_envs.route_env import RouteEnv
 from wrappers.interventions import EDITS, ObservationEdit, ObservationEditing, setting
@@ -375,3 +376,10 @@ def test_an_edit_of_ones_own_is_found_by_its_place_in_code_and_kept_in_the_space
 def test_an_edit_of_ones_own_that_makes_no_numbers_is_told_so(seen):
     with np.errstate(over="ignore", invalid="ignore"), pytest.raises(EditError, match="not finite"):
         edited([Scale(targets=("routing",), by=1e308)], {**seen, "routing": seen["routing"] * 1e3})
+
+
+@pytest.mark.parametrize("preset", ["box", "flat"])
+def test_what_a_preset_shows_is_not_edited(preset):
+    space = Form(observation_space(("prompt",)), preset).space
+    with pytest.raises(EditError, match=r"without a preset|expected a Dict"):
+        ObservationEditing("drop:routing", space)

@@ -11,7 +11,12 @@ import torch
 from gymnasium.wrappers import RescaleAction
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+from stable_baselines3.common.vec_env import (
+    DummyVecEnv,
+    VecFrameStack,
+    VecMonitor,
+    VecNormalize,
+)
 
 import di_envs
 from wrappers.actions import PedalWrapper, WaypointWrapper, pedal_vector
@@ -155,3 +160,19 @@ def test_the_features_are_blind_to_the_order_of_rows_and_to_empty_ones():
     red[:, 3], green[:, 3] = 3.0, 1.0
     lit = [of({**observation, "traffic_lights": table}) for table in (red, green)]
     assert not torch.equal(*lit)
+
+
+def test_stable_baselines_own_wrappers_take_boxes_and_vectors():
+    flat = VecNormalize(VecFrameStack(vector(2, preset="flat"), 3))
+    assert flat.reset().shape == (2, 3 * 364)
+    boxes = VecNormalize(VecFrameStack(vector(2, preset="box"), 3))
+    assert boxes.reset()["command"].shape == (2, 3 * 7)
+    for worlds in (flat, boxes):
+        worlds.step(np.zeros((2, 2), np.float32))
+        worlds.close()
+
+
+@pytest.mark.parametrize("preset", ["box", "flat"])
+def test_the_checker_has_nothing_to_say_about_presets(preset):
+    env = gymnasium.make(TOY, observations=("prompt",), preset=preset)
+    check_env(PedalWrapper(env) if preset == "flat" else VectorObservations(PedalWrapper(env)))

@@ -47,6 +47,11 @@ class ObservationEditing:
         """
         if not isinstance(space, spaces.Dict):
             raise EditError(f"edits are of named entries: expected a Dict of them, got {space}")
+        if isinstance(space.get("command"), spaces.Box):
+            raise EditError(
+                "edits are of observations as they are, and with preset='box' a command is no "
+                "choice any more: make the environment without a preset"
+            )
         self.edits = read_observation_edits(edits) if isinstance(edits, str) else tuple(edits)
         self._space = space
         self._steps = tuple(_Step(edit=edit, names=self._names(edit)) for edit in self.edits)

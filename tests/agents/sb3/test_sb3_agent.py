@@ -12,7 +12,12 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra rl")
-from gymnasium.wrappers import FilterObservation, RescaleAction, TransformObservation
+from gymnasium.wrappers import (
+    FilterObservation,
+    FlattenObservation,
+    RescaleAction,
+    TransformObservation,
+)
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 
 from agents import AgentSpecError, load_agent
@@ -136,6 +141,127 @@ def test_the_direct_control_needs_no_translation(tmp_path):
     action, _ = model.predict(observation, deterministic=True)
     control, _ = agent.act(env.unwrapped.observe(), agent.start(env.unwrapped.plan, 0))
     np.testing.assert_array_equal(control, action)
+
+
+def preset_toy(**options):
+    options = {"observations": ("prompt",), "traffic": 4, **options}
+    return PedalWrapper(gymnasium.make(TOY, **options))
+
+
+def in_one_vector(env):
+    """A small model of one vector, saved."""
+    return PPO(
+        "MlpPolicy",
+        env,
+        n_steps=16,
+        batch_size=16,
+        policy_kwargs=dict(SMALL),
+        seed=0,
+        device="cpu",
+    )
+
+
+FORMS = {
+    "flat": lambda: preset_toy(preset="flat"),
+    "flattened": lambda: FlattenObservation(preset_toy()),
+    "flattened boxes": lambda: FlattenObservation(preset_toy(preset="box")),
+    "flattened vectors": lambda: FlattenObservation(VectorObservations(preset_toy())),
+    "with odometry": lambda: preset_toy(preset="flat", observations=("prompt", "odometry")),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_model_of_one_vector_sees_here_what_it_learned_on(tmp_path, form):
+    env = FORMS[form]()
+    model = in_one_vector(env)
+    model.save(tmp_path / "model.zip")
+    agent = load_agent(f"sb3:{tmp_path / 'model.zip'}")
+    groups = ("prompt", "odometry") if form == "with odometry" else ("prompt",)
+    assert agent.requires.observations == groups
+    expected = "flat" if "with" in form else {"flattened boxes": "box"}.get(form, form)
+    assert agent.requires.preset == (expected if expected in ("flat", "box") else "")
+    assert_drives_like(agent, model, env, observations=groups)
+
+
+def assert_drives_like(agent, model, env, **options):
+    """The agent, shown what there is as it is, does what the model does on its own environment."""
+    raw = preset_toy(**options)
+    observation, _ = env.reset(seed=1, options={"route": 0})
+    as_it_is, _ = raw.reset(seed=1, options={"route": 0})
+    memory, state = agent.start(raw.unwrapped.plan, 1), None
+    for _ in range(3):
+        action, state = model.predict(observation, state=state, deterministic=True)
+        control, memory = agent.act(as_it_is, memory)
+        assert control.tolist() == [max(action[0], 0.0), action[1], max(-action[0], 0.0)]
+        observation, *_ = env.step(action)
+        as_it_is, *_ = raw.step(action)
+
+
+def test_a_model_of_boxes_drives_and_its_run_keeps_the_preset(tmp_path):
+    env = preset_toy(preset="box")
+    model, spec = ppo(tmp_path / "boxes.zip", env, preset="box")
+    agent = load_agent(spec)
+    assert agent.requires.preset == "box"
+    assert_drives_like(agent, model, env)
+    kept = agent.requires.as_json()
+    assert kept["preset"] == "box"
+    assert type(agent.requires).of_json(kept) == agent.requires
+    assert "preset" not in load_agent("constant").requires.as_json()  # as in older records
+
+
+def test_what_a_model_says_of_its_preset_must_be_what_its_space_is(tmp_path):
+    model = in_one_vector(FORMS["flat"]())
+    model.driveinsight_options = {"preset": "box"}
+    model.save(tmp_path / "wrong.zip")
+    assert "preset='box', but its observation space is that of preset='flat'" in refusal(
+        f"sb3:{tmp_path / 'wrong.zip'}"
+    )
+
+
+def test_a_vector_of_chosen_entries_is_refused_with_what_there_is(tmp_path):
+    in_one_vector(FlattenObservation(PedalWrapper(toy()))).save(tmp_path / "some.zip")
+    message = refusal(f"sb3:{tmp_path / 'some.zip'}")
+    assert "(208,)" in message  # speed, 50 points of 4, a command of 7
+    assert "train it on preset='flat'" in message
+    assert "(364,)" in message
+
+
+@pytest.mark.parametrize("algorithm", ["RecurrentPPO", "TQC", "CrossQ"])
+def test_models_of_sb3_contrib_drive_and_a_recurrent_one_remembers_in_its_memory(
+    tmp_path, algorithm
+):
+    contrib = pytest.importorskip("sb3_contrib", reason="needs the extra rl")
+    env = FORMS["flat"]()
+    recurrent = algorithm == "RecurrentPPO"
+    network = dict(SMALL) | ({"lstm_hidden_size": 8} if recurrent else {})
+    settings = {"n_steps": 16, "batch_size": 16} if recurrent else {"buffer_size": 10}
+    model = getattr(contrib, algorithm)(
+        "MlpLstmPolicy" if recurrent else "MlpPolicy",
+        env,
+        policy_kwargs=network,
+        seed=0,
+        device="cpu",
+        **settings,
+    )
+    model.save(tmp_path / "model.zip")
+    agent = load_agent(f"sb3:{tmp_path / 'model.zip'}")
+    assert_drives_like(agent, model, env)
+    seen, _ = preset_toy().reset(seed=1)
+    _, memory = agent.act(seen, start := agent.start(None, 0))
+    first, _ = agent.act(seen, start)
+    second, _ = agent.act(seen, memory)
+    assert (first.tolist() != second.tolist()) == recurrent
+    assert agent.act(seen, start)[0].tolist() == first.tolist()
+
+
+def test_without_sb3_contrib_its_models_name_the_cure(tmp_path, monkeypatch):
+    data = {"policy_class": {"__module__": "sb3_contrib.tqc.policies"}}
+    with zipfile.ZipFile(tmp_path / "tqc.zip", "w") as archive:
+        archive.writestr("data", json.dumps(data))
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    assert "needs sb3_contrib: pip install 'driveinsight[rl]'" in refusal(
+        f"sb3:{tmp_path / 'tqc.zip'}"
+    )
 
 
 def refusal(spec):

@@ -1,0 +1,111 @@
+"""Runs the examples of docs/learning.md and scores what they wrote: prints the page's table.
+
+    python docs/scripts/learners.py --output learners                    all of them
+    python docs/scripts/learners.py --output learners --only TorchRL     those with such titles
+
+Each runs in a process of its own, so the time of a processor that it took is its own, too. An
+example whose packages are not here is left out, aloud. Scores are of `town05_tiny`, seed 0, as
+`driveinsight evaluate --agent AGENT --suite town05_tiny --trust` gives them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+
+import tyro
+
+from leaderboard import evaluate
+
+TOP = Path(__file__).resolve().parents[2]
+EXAMPLE = re.compile(r"^## (.+)\n(?:(?!## ).*\n)*?```python\n((?:(?!```).*\n)*)", re.MULTILINE)
+DECISIONS = re.compile(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Learners:
+    """Which examples, and where what they write goes."""
+
+    output: Path = Path("learners")
+    """Folder, one inside it for each example."""
+
+    only: str = ""
+    """Part of the titles of those to run; all when empty."""
+
+    routes: tuple[str, ...] = ()
+    """Ids of the routes to score on; all when empty."""
+
+
+def trained(code: str, folder: Path) -> float | None:
+    """Runs an example in a folder; the processor's seconds that it took, None if it failed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "learner.py").write_text(code, encoding="utf-8")
+    before = getrusage(RUSAGE_CHILDREN)
+    paths = {"PYTHONPATH": str(TOP)}
+    with (folder / "output.txt").open("w", encoding="utf-8") as output:
+        done = subprocess.run(
+            [sys.executable, "learner.py"],
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env={**os.environ, "OMP_NUM_THREADS": "1", **paths},
+            check=False,
+        )
+    after = getrusage(RUSAGE_CHILDREN)
+    if done.returncode != 0:
+        return None
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def agents_of(folder: Path) -> Iterator[tuple[str, str, str]]:
+    """What an example wrote: a name, the agent before and the agent after."""
+    for before in sorted(folder.glob("*_untrained.zip")):
+        name = before.name.removesuffix("_untrained.zip")
+        yield name, f"sb3:{before}", f"sb3:{folder / name}.zip"
+    said = (folder / "output.txt").read_text(encoding="utf-8")
+    found = dict(re.findall(r"^(before|after): pickled:(\S+)", said, flags=re.MULTILINE))
+    if found:
+        yield "", *(f"pickled:{folder / found[when]}" for when in ("before", "after"))
+
+
+def score(agent: str, output: Path, routes: tuple[str, ...]) -> float:
+    """The driving score of an agent."""
+    run = evaluate(
+        agent, "town05_tiny", routes=routes, output=output, overwrite=output.exists(), trust=True
+    )
+    return run.driving_score
+
+
+def main(chosen: Learners) -> None:
+    """Runs and scores them, and prints a row each."""
+    page = (TOP / "docs" / "learning.md").read_text(encoding="utf-8")
+    print("| example | decisions | seconds of a core | DS before | DS after |")
+    print("|---|---:|---:|---:|---:|")
+    for title, code in EXAMPLE.findall(page):
+        if chosen.only not in title:
+            continue
+        folder = chosen.output / re.sub(r"\W+", "-", title).strip("-").lower()
+        spent_s = trained(code, folder)
+        if spent_s is None:
+            last = (folder / "output.txt").read_text(encoding="utf-8").strip().splitlines()[-1]
+            print(f"{title} did not run: {last}", file=sys.stderr)
+            continue
+        (steps,) = DECISIONS.findall(code)
+        for name, *agents in agents_of(folder):
+            scores = [
+                score(agent, folder / f"{name}{when}", chosen.routes)
+                for agent, when in zip(agents, ("before", "after"), strict=True)
+            ]
+            called = f"{title} (`{name}`)" if name else title
+            told = " | ".join(f"{value:.1f}" for value in scores)
+            print(f"| {called} | {steps.replace('_', ',')} | {spent_s:.0f} | {told} |", flush=True)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Learners, description=__doc__))
