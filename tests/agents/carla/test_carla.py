@@ -290,6 +290,21 @@ def test_a_wrong_option_is_refused(query, says, tmp_path):
         load_agent(written(tmp_path) + query)
 
 
+def test_an_agent_may_say_names_that_numpy_has_dropped(tmp_path):
+    """`numpy.int` went with 1.24; InterFuser draws its map by it."""
+    body = """
+    def run_step(self, input_data, timestamp):
+        import numpy
+        rounded = numpy.array([0.9]).astype(numpy.int)[0] + numpy.float(0.5)
+        return SimpleNamespace(throttle=rounded, steer=0.0, brake=0.0)
+    """
+    agent = load_agent(written(tmp_path, body))
+    env = RouteEnv(**environment_options(QUIET, agent.requires))
+    observation, _ = env.reset(seed=1)
+    control, _ = agent.act(observation, agent.start(env.plan, 1))
+    assert control.tolist() == [0.5, 0.0, 0.0]
+
+
 def test_a_missing_file_is_named():
     with pytest.raises(AgentSpecError, match=r"there is no file .*nowhere\.py"):
         load_agent("carla:nowhere.py")
