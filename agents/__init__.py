@@ -186,7 +186,7 @@ SCHEMES: dict[str, AgentEntry] = {
     "carla": AgentEntry(
         entry_point="agents.carla.agent:CarlaAgent",
         summary="carla:FILE.py[?config=FILE&leaderboard=2.1]: an agent for the CARLA Leaderboard",
-        version=2,
+        version=3,
         argument="file",
         packages=("highway-env", "stable-baselines3", "torch"),
     ),

@@ -226,7 +226,7 @@ class Observer:
                 speed_mps = min(max(speed_mps, -SPEED_LIMIT_MPS), SPEED_LIMIT_MPS)
                 observation["speed"] = np.array([speed_mps], np.float32)
         if self._with_odometry:
-            observation["odometry"] = _odometry(sight.state, sight.route, self._ego)
+            observation["odometry"] = odometry_of(sight.state, sight.route, self._ego)
         if self._cameras is not None:
             self._follow_weather(self._cameras)
             observation.update(self._cameras.observe())
@@ -239,7 +239,7 @@ class Observer:
         return observation
 
 
-def _odometry(state: State, route: PromptRoute, ego: int) -> Float32:
+def odometry_of(state: State, route: PromptRoute, ego: int) -> Float32:
     """(3,) x, y [m], yaw [rad] of an ego in the frame of its route's first point."""
     x, y, _, yaw = route.points[0].tolist()
     dx, dy = float(state.x[ego]) - x, float(state.y[ego]) - y

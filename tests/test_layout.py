@@ -35,7 +35,7 @@ FLOORS = {
     ),
     "wrappers": ({"interventions"}, {""}),
     "leaderboard": (
-        {"scoring", "statistics", "autoagents", "envs", "utils"},
+        {"scoring", "statistics", "autoagents", "envs", "utils", "exporting"},
         {"records"},
         {"running"},
         {"replaying"},
@@ -52,6 +52,7 @@ ABSOLUTE = re.compile(r"^(/(home|work|tmp|usr|etc|root|var|mnt|opt|data)\b|[A-Za
 # Modules that ask the environment, and why they may
 ASKING = {
     "agents/carla/importing.py": "agents for CARLA read what its scripts say by them",
+    "leaderboard/exporting/carla_file.py": "it starts a Python, with its own packages, in CARLA's",
     "agents/processes.py": "Python is told by one to look for no module in the working folder",
     "di_envs/drawing/window.py": "a desktop says by one that there is a display",
     "di_envs/files/caches.py": "who runs a container says by one where caches may be written",

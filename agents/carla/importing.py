@@ -3,6 +3,7 @@
 - `carla` is the wheel; without it, the plain values of `agents.carla.values`.
 - `srunner.scenariomanager.carla_data_provider` and `.timer` are `agents.carla.data_provider`.
 - `leaderboard` and `agents` are this project's, whatever lies in the agent's folders.
+- NumPy has the names that it had when agents were written (`agents.carla.numpy_names`).
 - Environment variables that CARLA's scripts set are there, unless they were set already.
 """
 
@@ -19,6 +20,7 @@ from typing import Any
 
 from agents import AgentSpecError, module_of_file
 from agents.carla import data_provider
+from agents.carla.numpy_names import put_back
 from agents.carla.values import carla_values
 from agents.import_folders import import_first
 
@@ -56,6 +58,7 @@ def entry_class(path: Path, config: str, folders: Sequence[Path]) -> type[Any]:
         importlib.import_module(name)
     import_first([*folders, path.parent])  # as CARLA's scripts do: agents import what lies beside
     _stand_in()
+    put_back()
     _say_environment(path, config)
     try:
         module = module_of_file(spec, path)

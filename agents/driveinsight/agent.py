@@ -79,6 +79,11 @@ class DriveInsightAgent:
         self._every = round(self.policy.config.memory_dt_s / CONTROL_DT_S)
         self._edits: tuple[TapEdit, ...] = ()
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Components of the prompt that it reads; its controllers read the speed."""
+        return tuple(dict.fromkeys((*self.policy.config.prompt, "speed")))
+
     def edited(self, edits: Sequence[EditText]) -> Self:
         """The same agent with these edits inside its policy; see `tap_edits`.
 

@@ -75,9 +75,9 @@ class GlobalRoutePlanner:
             known[key] = cost_m
             reached.append((waypoint, parent, option))
             here = len(reached) - 1
-            if self._is_there(waypoint, goal):
-                return _way_back(reached, here)
-            for beyond, add_m, beyond_option in self._ahead(waypoint):
+            if _lane_of(waypoint) == _lane_of(goal) and self._is_near(waypoint, goal):
+                return _ending(_way_back(reached, here), goal)
+            for beyond, add_m, beyond_option in self._ahead(waypoint, goal):
                 count += 1
                 far_m = beyond.transform.location.distance(end)
                 total_m = cost_m + add_m
@@ -85,7 +85,7 @@ class GlobalRoutePlanner:
                 heapq.heappush(queue, row)
         raise NoWayError(f"no way leads from {start} to {goal}")
 
-    def _ahead(self, waypoint: Any) -> Iterator[tuple[Any, float, RoadOption]]:
+    def _ahead(self, waypoint: Any, goal: Any) -> Iterator[tuple[Any, float, RoadOption]]:
         """Places that can be reached next: metres, and how."""
         for beyond in waypoint.next(self._resolution_m):
             yield beyond, self._resolution_m, RoadOption.LANEFOLLOW
@@ -100,20 +100,39 @@ class GlobalRoutePlanner:
             beside = neighbour() if allowed in (side, "Both") else None
             if beside is None or beside.lane_id * waypoint.lane_id < 0:
                 continue
+            if _lane_of(beside) == _lane_of(goal) and self._is_near(beside, goal, CHANGE_M):
+                yield goal, CHANGE_COST_M, option  # too near to be changed to as others are
             for beyond in beside.next(CHANGE_M):
                 if beyond.lane_type == waypoint.lane_type:
                     yield beyond, CHANGE_M + CHANGE_COST_M, option
 
     def _key(self, waypoint: Any) -> tuple[int, int, int, int]:
-        step = round(waypoint.s / self._resolution_m)
-        return waypoint.road_id, waypoint.section_id, waypoint.lane_id, step
+        """The same for places close together: finer than steps, so that none is left out."""
+        return (*_lane_of(waypoint), round(4.0 * waypoint.s / self._resolution_m))
 
-    def _is_there(self, waypoint: Any, goal: Any) -> bool:
-        lane = (waypoint.road_id, waypoint.section_id, waypoint.lane_id)
-        if lane != (goal.road_id, goal.section_id, goal.lane_id):
-            return False
-        far_m = waypoint.transform.location.distance(goal.transform.location)
-        return bool(far_m <= 0.75 * self._resolution_m)
+    def _is_near(self, waypoint: Any, goal: Any, ahead_m: float = 0.0) -> bool:
+        """Whether a goal on the same lane is within a step, or so far ahead."""
+        place, there = waypoint.transform, goal.transform.location
+        far_m = place.location.distance(there)
+        if far_m <= self._resolution_m + 0.01:
+            return True
+        return bool(far_m <= ahead_m and _is_ahead(place, there))
+
+
+def _lane_of(waypoint: Any) -> tuple[int, int, int]:
+    return waypoint.road_id, waypoint.section_id, waypoint.lane_id
+
+
+def _is_ahead(place: Any, there: Any) -> bool:
+    way = place.get_forward_vector()
+    return bool((there.x - place.location.x) * way.x + (there.y - place.location.y) * way.y > 0.0)
+
+
+def _ending(way: Trace, goal: Any) -> Trace:
+    """The same way, which ends at the goal itself."""
+    last, option = way[-1]
+    kept = way if _is_ahead(last.transform, goal.transform.location) else way[:-1]
+    return [*kept, (goal, option)]
 
 
 def _beside_junction(waypoint: Any) -> Any:

@@ -86,6 +86,11 @@ class SystemAgent:
         self.rules = rules == "on"
         self._edits: tuple[TapEdit, ...] = ()
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Components of the prompt that it reads; its controllers read the speed."""
+        return tuple(dict.fromkeys((*self.network.config.told, "speed")))
+
     def edited(self, edits: Sequence[EditText]) -> Self:
         """The same agent with these edits inside its network; see `tap_edits`.
 

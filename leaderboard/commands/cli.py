@@ -36,6 +36,7 @@ from leaderboard.commands.ending import (
 from leaderboard.commands.evaluate import EVALUATE_HELP, Evaluate
 from leaderboard.commands.explain import EXPLAIN_HELP, Explain
 from leaderboard.commands.export import EXPORT_HELP, Export
+from leaderboard.commands.export_agent import EXPORT_AGENT_HELP, ExportAgent
 from leaderboard.commands.lists import Agents, Suites
 from leaderboard.commands.play import PLAY_HELP, Play
 from leaderboard.commands.report import REPORT_HELP, Report
@@ -80,6 +81,7 @@ Command = (
     | Annotated[Collect, tyro.conf.subcommand("collect", description=COLLECT_HELP)]
     | Annotated[Train, tyro.conf.subcommand("train", description=TRAIN_HELP)]
     | Annotated[Export, tyro.conf.subcommand("export", description=EXPORT_HELP)]
+    | Annotated[ExportAgent, tyro.conf.subcommand("export-agent", description=EXPORT_AGENT_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor", description=DOCTOR_HELP)]

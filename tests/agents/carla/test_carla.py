@@ -7,6 +7,7 @@ import json
 import sys
 import textwrap
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -289,6 +290,21 @@ def test_a_wrong_option_is_refused(query, says, tmp_path):
         load_agent(written(tmp_path) + query)
 
 
+def test_an_agent_may_say_names_that_numpy_has_dropped(tmp_path):
+    """`numpy.int` went with 1.24; InterFuser draws its map by it."""
+    body = """
+    def run_step(self, input_data, timestamp):
+        import numpy
+        rounded = numpy.array([0.9]).astype(numpy.int)[0] + numpy.float(0.5)
+        return SimpleNamespace(throttle=rounded, steer=0.0, brake=0.0)
+    """
+    agent = load_agent(written(tmp_path, body))
+    env = RouteEnv(**environment_options(QUIET, agent.requires))
+    observation, _ = env.reset(seed=1)
+    control, _ = agent.act(observation, agent.start(env.plan, 1))
+    assert control.tolist() == [0.5, 0.0, 0.0]
+
+
 def test_a_missing_file_is_named():
     with pytest.raises(AgentSpecError, match=r"there is no file .*nowhere\.py"):
         load_agent("carla:nowhere.py")
@@ -373,6 +389,45 @@ def test_the_constants_of_agents_for_0_9_10_give_the_next_target_to_a_decimetre(
         north, east = (place - first) * CONSTANTS
         x, y = env.plan.points[env.plan.targets[1], :2] - env.plan.points[env.plan.targets[0], :2]
         assert (east, north) == (pytest.approx(x, abs=0.1), pytest.approx(-y, abs=0.1))
+
+
+BY_CONSTANTS = """
+import carla_leaderboard_agent as example
+
+
+def get_entry_point():
+    return "ByConstants"
+
+
+class Way(example.Way):
+    def metres(self, latitude, longitude):
+        north, east = latitude * 111324.60662786, longitude * 111319.490945
+        return east, -north
+
+
+class ByConstants(example.RouteFollower):
+    def run_step(self, input_data, timestamp):
+        if self.way is None:
+            self.way = Way(self._global_plan, self._global_plan_world_coord)
+        return super().run_step(input_data, timestamp)
+"""
+
+
+def test_the_example_does_the_same_by_the_constants_of_agents_for_0_9_10(tmp_path):
+    """It reads the route's origin otherwise; here both are asked along one drive."""
+    (tmp_path / "constants.py").write_text(BY_CONSTANTS)
+    examples = Path(__file__).parents[3] / "examples"
+    reads = load_agent(f"carla:{examples}/carla_leaderboard_agent.py")
+    counts = load_agent(f"carla:{tmp_path}/constants.py?path={examples}")
+    env = RouteEnv(**environment_options(QUIET, reads.requires))
+    observation, _ = env.reset(seed=1)
+    memories = [agent.start(env.plan, 1) for agent in (reads, counts)]
+    for _ in range(12):
+        control, memories[0] = reads.act(observation, memories[0])
+        other, memories[1] = counts.act(observation, memories[1])
+        assert other == pytest.approx(control, abs=0.002)
+        observation, *_ = env.step(control)
+    assert env.view.state.speed[0] > 0.5
 
 
 def test_agents_of_leaderboard_two_count_from_the_maps_origin(tmp_path):

@@ -13,11 +13,13 @@ from agents import load_agent
 from agents.base import Track
 from agents.carla import data_provider
 from agents.carla.data_provider import CarlaDataProvider, GameTime, NoTruthError
-from agents.carla.true_map import TrueMap
+from agents.carla.true_map import TrueMap, Waypoint
 from agents.carla.values import carla_values
 from agents.navigation.global_route_planner import GlobalRoutePlanner, NoWayError, RoadOption
 from agents.navigation.local_planner import LocalPlanner
 from di_envs.route_env import RouteEnv
+from di_envs.town.lanes import LaneKind
+from di_envs.town.loading import load_town
 from leaderboard.autoagents.autonomous_agent import AutonomousAgent
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import Job, RunSpec
@@ -162,6 +164,38 @@ def test_the_planner_finds_the_route_and_names_its_turns(env):
     assert {option for _, option in way} == {RoadOption(int(o)) for o in set(plan.option.tolist())}
     with pytest.raises(NoWayError, match="no lane is near"):
         planner.trace_route(ends[0], carla.Location(x=9000.0, y=0.0, z=0.0))
+
+
+def test_every_place_just_ahead_is_reached_by_no_detour_also_at_the_ends_of_lanes(env):
+    """From each lane's end over a bound of lanes: steps of 2 m meet few places exactly."""
+    town_map = TrueMap(env.view.town)
+    lanes, planner = env.view.town.lanes, GlobalRoutePlanner(town_map, 2.0)
+    for lane in np.flatnonzero((lanes.kind == LaneKind.DRIVING) & (lanes.junction < 0))[
+        :6
+    ].tolist():
+        length_m = float(lanes.length_m[lane])
+        for back_m, ahead_m in ((27.0, 26.9), (9.3, 9.3), (6.5, 0.4), (0.1, 0.0)):
+            start = Waypoint(town_map, lane, max(length_m - back_m, 0.0))
+            goal = start.next(min(ahead_m, length_m))[0]
+            way = planner.trace_route(start.transform.location, goal.transform.location)
+            places = [waypoint.transform.location for waypoint, _ in way]
+            far_m = sum(map(carla_values().Location.distance, places, places[1:]))
+            assert far_m <= ahead_m + 2.1
+            assert places[-1].distance(goal.transform.location) < 1.0
+
+
+def test_who_must_be_on_the_next_lane_in_a_few_metres_changes_to_it_at_once():
+    """Where a lane change begins and ends, the thinned route has a point on each lane."""
+    town = load_town("town05")
+    town_map, lanes = TrueMap(town), town.lanes
+    side = lanes.change[lanes.first] & 2 != 0
+    lane = int(np.flatnonzero(side & (lanes.right >= 0) & (lanes.length_m > 40.0))[0])
+    start = Waypoint(town_map, lane, 20.0)
+    goal = start.get_right_lane().next(5.0)[0]
+    planner = GlobalRoutePlanner(town_map, 2.0)
+    way = planner.trace_route(start.transform.location, goal.transform.location)
+    assert way[-1] == (goal, RoadOption.CHANGELANERIGHT)
+    assert len(way) == 2
 
 
 def test_without_a_plan_the_local_planner_drives_straight_on(told):

@@ -172,7 +172,7 @@ def test_files_of_the_users_own_are_told_by_what_they_hold(tmp_path):
     agent.write_text("one")
     before = [agent_version(spec) for spec in specs]
     assert [text.rpartition(" ")[0] for text in before] == [
-        "file", "carla 2, files", "carla 2, files", "sb3 1, files"
+        "file", "carla 3, files", "carla 3, files", "sb3 1, files"
     ]  # fmt: skip
     config.write_text("b")
     after = [agent_version(spec) for spec in specs]

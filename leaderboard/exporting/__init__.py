@@ -1,0 +1,1 @@
+"""Agents of ours as files for other people's simulators."""
