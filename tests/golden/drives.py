@@ -121,6 +121,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     "driveinsight on town05_short": GoldenDrive(
         agent="driveinsight", suite="town05_short", route="8", seconds=3.0
     ),
+    "driveinsight-told on town05_short": GoldenDrive(
+        agent="driveinsight-told", suite="town05_short", route="8", seconds=3.0
+    ),
     "every sensor in rain": GoldenDrive(
         agent="expert", suite="town05_short", route="0", seconds=2.0, shown=EVERY_SENSOR
     ),
