@@ -170,7 +170,7 @@ def test_the_command_shows_both_futures_and_writes_a_picture(run, hit, tmp_path,
     assert main([*asked, f"remove:actor={hit.other}"]) == 0
     out = capsys.readouterr().out
     assert "as recorded" in out
-    assert "Next: driveinsight verify" in out
+    assert all(f"driveinsight {step} {folder}" in out for step in ("report", "verify"))
     branched = folder / "branch-60-3s"
     assert np.asarray(Image.open(branched / "branch.png")).std() > 20.0
     assert json.loads((branched / "results.json").read_text())["entry_status"] == "Finished"
