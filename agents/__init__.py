@@ -371,10 +371,11 @@ def module_of(spec: str, place: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name is None or not (place + ".").startswith(error.name + "."):
             raise  # the module is there, something that it imports is not
-        raise AgentSpecError(
-            f"agent '{spec}': no module '{error.name}'; expected a name, module:Class or "
-            f"path/to/file.py:Class. {_unknown_name(place)}"
-        ) from None
+        said = f"agent '{spec}': no module '{error.name}'"
+        if spec.partition(":")[0] not in SCHEMES:  # perhaps no module was meant
+            said += "; expected a name, module:Class or path/to/file.py:Class. "
+            said += _unknown_name(place)
+        raise AgentSpecError(said) from None
 
 
 def module_of_file(spec: str, path: Path) -> ModuleType:

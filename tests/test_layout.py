@@ -43,8 +43,7 @@ FLOORS = {
         {"tables"},
         {"pages"},
         {"commands"},
-        {"api"},
-        {""},
+        {"", "api"},
     ),
 }
 MODULES = sorted(path for package in ALLOWED for path in (TOP / package).rglob("*.py"))
