@@ -190,7 +190,9 @@ def skip_without_packages(code):
 
 def learned(code, folder):
     """Runs an example of the page on learning, cut short; returns the agents that it wrote."""
-    short = re.sub(r"\b(8_192|4_096)\b", "512", code)
+    short = re.sub(r"\b(8_192|4_096|2_048)\b", "512", code).replace(
+        "DRIVES, STEPS = 32", "DRIVES, STEPS = 2"
+    )
     assert short != code, "the example does not say how long it trains"
     (folder / "learner.py").write_text(short, encoding="utf-8")
     done = subprocess.run(
@@ -235,6 +237,18 @@ def test_the_first_example_of_the_page_on_learning_trains_an_agent(tmp_path):
 def test_every_other_example_of_the_page_on_learning_trains_an_agent(title, tmp_path):
     skip_without_packages(LEARNERS[title])
     check_learner(title, tmp_path)
+
+
+@pytest.mark.parametrize("title", LEARNERS)
+def test_each_example_of_the_page_on_learning_has_scores_for_its_steps(title):
+    (steps,) = re.findall(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", LEARNERS[title], re.MULTILINE)
+    found = [line for line in LEARNING.splitlines() if line.startswith(f"| {title} ")]
+    assert found
+    for line in found:
+        _, told, _, before, after = [cell.strip() for cell in line.strip("|").split("|")]
+        assert told == steps.replace("_", ",")
+        assert 0.0 <= float(before) <= 100.0
+        assert 0.0 <= float(after) <= 100.0
 
 
 def test_the_tables_of_edits_and_conditions_are_what_there_is():

@@ -5,13 +5,17 @@
 
 Each runs in a process of its own, so the time of a processor that it took is its own, too. An
 example whose packages are not here is left out, aloud. Scores are of `town05_tiny`, seed 0, as
-`driveinsight evaluate --agent AGENT --suite town05_tiny --trust` gives them.
+`driveinsight evaluate --agent AGENT --suite town05_tiny --trust --no-isolate` gives them. The same
+command goes on where it was stopped; an example whose text has changed since begins anew. The table
+lies in `table.md` of the folder, too: a row for each example that has one.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -25,7 +29,8 @@ from leaderboard import evaluate
 
 TOP = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^## (.+)\n(?:(?!## ).*\n)*?```python\n((?:(?!```).*\n)*)", re.MULTILINE)
-DECISIONS = re.compile(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", re.MULTILINE)
+STEPS = re.compile(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", re.MULTILINE)
+HEAD = "| example | steps | seconds of a core | DS before | DS after |\n|---|---:|---:|---:|---:|\n"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +47,24 @@ class Learners:
     """Ids of the routes to score on; all when empty."""
 
 
+def folder_of(title: str, output: Path) -> Path:
+    """Where what an example writes goes."""
+    return output / re.sub(r"\W+", "-", title).strip("-").lower()
+
+
 def trained(code: str, folder: Path) -> float | None:
-    """Runs an example in a folder; the processor's seconds that it took, None if it failed."""
+    """Runs an example in a folder of its own, unless it has run there to its end already.
+
+    Returns:
+        The processor's seconds that it took, None if it failed.
+    """
+    text, took = folder / "learner.py", folder / "took.json"
+    if took.exists() and text.read_text(encoding="utf-8") == code:
+        return float(json.loads(took.read_text(encoding="utf-8"))["core_s"])
+    if text.exists():
+        shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "learner.py").write_text(code, encoding="utf-8")
+    text.write_text(code, encoding="utf-8")
     before = getrusage(RUSAGE_CHILDREN)
     paths = {"PYTHONPATH": str(TOP)}
     with (folder / "output.txt").open("w", encoding="utf-8") as output:
@@ -60,7 +79,9 @@ def trained(code: str, folder: Path) -> float | None:
     after = getrusage(RUSAGE_CHILDREN)
     if done.returncode != 0:
         return None
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    core_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    took.write_text(json.dumps({"core_s": core_s}), encoding="utf-8")
+    return core_s
 
 
 def agents_of(folder: Path) -> Iterator[tuple[str, str, str]]:
@@ -75,36 +96,55 @@ def agents_of(folder: Path) -> Iterator[tuple[str, str, str]]:
 
 
 def score(agent: str, output: Path, routes: tuple[str, ...]) -> float:
-    """The driving score of an agent."""
+    """The driving score of an agent; a run that was stopped is gone on with."""
     run = evaluate(
-        agent, "town05_tiny", routes=routes, output=output, overwrite=output.exists(), trust=True
+        agent,
+        "town05_tiny",
+        routes=routes,
+        output=output,
+        resume=True,
+        trust=True,
+        isolate=False,  # the agents are the page's
     )
     return run.driving_score
+
+
+def rows_of(title: str, code: str, folder: Path, routes: tuple[str, ...]) -> Iterator[str]:
+    """The table's rows of an example: one for each agent that it trained."""
+    spent_s = trained(code, folder)
+    if spent_s is None:
+        last = (folder / "output.txt").read_text(encoding="utf-8").strip().splitlines()[-1]
+        print(f"{title} did not run: {last}", file=sys.stderr)
+        return
+    (steps,) = STEPS.findall(code)
+    for name, *agents in agents_of(folder):
+        scores = [
+            score(agent, folder / f"{name}{when}", routes)
+            for agent, when in zip(agents, ("before", "after"), strict=True)
+        ]
+        called = f"{title} (`{name}`)" if name else title
+        told = " | ".join(f"{value:.1f}" for value in scores)
+        yield f"| {called} | {steps.replace('_', ',')} | {spent_s:.0f} | {told} |\n"
 
 
 def main(chosen: Learners) -> None:
     """Runs and scores them, and prints a row each."""
     page = (TOP / "docs" / "learning.md").read_text(encoding="utf-8")
-    print("| example | decisions | seconds of a core | DS before | DS after |")
-    print("|---|---:|---:|---:|---:|")
-    for title, code in EXAMPLE.findall(page):
+    print(HEAD, end="", flush=True)
+    examples = EXAMPLE.findall(page)
+    for title, code in examples:
         if chosen.only not in title:
             continue
-        folder = chosen.output / re.sub(r"\W+", "-", title).strip("-").lower()
-        spent_s = trained(code, folder)
-        if spent_s is None:
-            last = (folder / "output.txt").read_text(encoding="utf-8").strip().splitlines()[-1]
-            print(f"{title} did not run: {last}", file=sys.stderr)
-            continue
-        (steps,) = DECISIONS.findall(code)
-        for name, *agents in agents_of(folder):
-            scores = [
-                score(agent, folder / f"{name}{when}", chosen.routes)
-                for agent, when in zip(agents, ("before", "after"), strict=True)
-            ]
-            called = f"{title} (`{name}`)" if name else title
-            told = " | ".join(f"{value:.1f}" for value in scores)
-            print(f"| {called} | {steps.replace('_', ',')} | {spent_s:.0f} | {told} |", flush=True)
+        folder = folder_of(title, chosen.output)
+        rows = ""
+        for row in rows_of(title, code, folder, chosen.routes):
+            print(row, end="", flush=True)
+            rows += row
+        if rows:
+            (folder / "rows.md").write_text(rows, encoding="utf-8")
+    written = [folder_of(title, chosen.output) / "rows.md" for title, _ in examples]
+    table = HEAD + "".join(path.read_text(encoding="utf-8") for path in written if path.exists())
+    (chosen.output / "table.md").write_text(table, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -211,3 +211,44 @@ def test_an_option_of_other_environments_is_what_python_calls_a_type_error():
         gymnasium.make(TOY, frameskip=1)
     with pytest.raises(UnknownOptionError, match="known: suite"):
         gymnasium.make_vec(TOY, num_envs=2, frameskip=1)
+
+
+@pytest.mark.filterwarnings("ignore")  # of TorchRL's own
+def test_torchrl_makes_our_environments_by_their_ids():
+    torchrl = pytest.importorskip("torchrl.envs", reason="docs/learning.md says how to install it")
+    env = torchrl.GymEnv(TOY, preset="flat", **QUIET)
+    env.set_seed(5)  # which resets it
+    plain = gymnasium.make(TOY, preset="flat", **QUIET)
+    plain.reset(seed=5)
+    np.testing.assert_array_equal(env.reset()["observation"], plain.reset()[0])
+    assert env.rollout(3)["observation"].shape == (3, 364)
+
+
+# ---- several egos, for what makes worlds of them
+
+
+@pytest.mark.parametrize("preset", ["box", "flat"])
+def test_every_ego_has_the_spaces_of_the_others_before_the_first_reset(preset):
+    # what SuperSuit asks of an environment that it pads, stacks or makes worlds of
+    egos = di_envs.parallel_env(2, suite="toy", preset=preset, **QUIET)
+    first, second = egos.possible_agents
+    assert egos.observation_space(first) == egos.observation_space(second)
+    assert egos.action_space(first) == egos.action_space(second)
+    assert egos.observation_space(first) is egos.observation_space(first)
+    assert egos.render_mode is None
+
+
+@pytest.mark.filterwarnings("ignore")  # of SuperSuit's own
+def test_supersuit_pads_stacks_and_makes_worlds_of_several_egos():
+    supersuit = pytest.importorskip("supersuit", reason="docs/learning.md says how to install it")
+    options = {**QUIET, "preset": "flat", "suite": "toy"}
+    egos = di_envs.parallel_env(2, **options)
+    egos = supersuit.frame_stack_v1(supersuit.black_death_v3(egos), 3)
+    worlds = supersuit.pettingzoo_env_to_vec_env_v1(egos)
+    worlds = supersuit.concat_vec_envs_v1(worlds, 2)
+    seen, _ = worlds.reset(seed=0)
+    assert seen.shape == (4, 3 * 364)
+    plain, _ = di_envs.parallel_env(2, **options).reset(seed=0)
+    np.testing.assert_array_equal(seen[0, -364:], plain["ego_0"])
+    after, *_ = worlds.step(np.zeros((4, 3), np.float32))
+    np.testing.assert_array_equal(after[:, 364:728], seen[:, 728:])

@@ -391,34 +391,11 @@ def test_the_constants_of_agents_for_0_9_10_give_the_next_target_to_a_decimetre(
         assert (east, north) == (pytest.approx(x, abs=0.1), pytest.approx(-y, abs=0.1))
 
 
-BY_CONSTANTS = """
-import carla_leaderboard_agent as example
-
-
-def get_entry_point():
-    return "ByConstants"
-
-
-class Way(example.Way):
-    def metres(self, latitude, longitude):
-        north, east = latitude * 111324.60662786, longitude * 111319.490945
-        return east, -north
-
-
-class ByConstants(example.RouteFollower):
-    def run_step(self, input_data, timestamp):
-        if self.way is None:
-            self.way = Way(self._global_plan, self._global_plan_world_coord)
-        return super().run_step(input_data, timestamp)
-"""
-
-
-def test_the_example_does_the_same_by_the_constants_of_agents_for_0_9_10(tmp_path):
+def test_the_example_does_the_same_by_the_constants_of_agents_for_0_9_10():
     """It reads the route's origin otherwise; here both are asked along one drive."""
-    (tmp_path / "constants.py").write_text(BY_CONSTANTS)
     examples = Path(__file__).parents[3] / "examples"
     reads = load_agent(f"carla:{examples}/carla_leaderboard_agent.py")
-    counts = load_agent(f"carla:{tmp_path}/constants.py?path={examples}")
+    counts = load_agent(f"carla:{Path(__file__).parent}/by_constants.py?path={examples}")
     env = RouteEnv(**environment_options(QUIET, reads.requires))
     observation, _ = env.reset(seed=1)
     memories = [agent.start(env.plan, 1) for agent in (reads, counts)]
