@@ -239,16 +239,16 @@ def test_every_other_example_of_the_page_on_learning_trains_an_agent(title, tmp_
     check_learner(title, tmp_path)
 
 
-@pytest.mark.parametrize("title", LEARNERS)
-def test_each_example_of_the_page_on_learning_has_scores_for_its_steps(title):
-    (steps,) = re.findall(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", LEARNERS[title], re.MULTILINE)
-    found = [line for line in LEARNING.splitlines() if line.startswith(f"| {title} ")]
-    assert found
-    for line in found:
-        _, told, _, before, after = [cell.strip() for cell in line.strip("|").split("|")]
+def test_scores_on_the_page_on_learning_are_of_its_examples_as_they_stand():
+    found = re.findall(
+        r"^\| (.+?)(?: \(`\w+`\))? \| ([\d,]+) \|(?: [\d.]+ \|){3}$", LEARNING, re.MULTILINE
+    )
+    assert IN_CI in dict(found)
+    for title, told in found:
+        (steps,) = re.findall(
+            r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", LEARNERS[title], re.MULTILINE
+        )
         assert told == steps.replace("_", ",")
-        assert 0.0 <= float(before) <= 100.0
-        assert 0.0 <= float(after) <= 100.0
 
 
 def test_the_tables_of_edits_and_conditions_are_what_there_is():

@@ -25,8 +25,10 @@ from resource import RUSAGE_CHILDREN, getrusage
 
 import tyro
 
+from di_envs.suites import load_suite
 from leaderboard import evaluate
 
+SUITE = "town05_tiny"
 TOP = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^## (.+)\n(?:(?!## ).*\n)*?```python\n((?:(?!```).*\n)*)", re.MULTILINE)
 STEPS = re.compile(r"^(?:\w+, )*STEPS(?:, \w+)* = ([\d_]+)", re.MULTILINE)
@@ -43,8 +45,8 @@ class Learners:
     only: str = ""
     """Part of the titles of those to run; all when empty."""
 
-    routes: tuple[str, ...] = ()
-    """Ids of the routes to score on; all when empty."""
+    every: int = 1
+    """Scores on every so many-th route: 4 means routes 0, 4, 8 and so on."""
 
 
 def folder_of(title: str, output: Path) -> Path:
@@ -95,21 +97,27 @@ def agents_of(folder: Path) -> Iterator[tuple[str, str, str]]:
         yield "", *(f"pickled:{folder / found[when]}" for when in ("before", "after"))
 
 
-def score(agent: str, output: Path, routes: tuple[str, ...]) -> float:
-    """The driving score of an agent; a run that was stopped is gone on with."""
+def score(agent: str, output: Path, routes: list[str]) -> float:
+    """The driving score of an agent; a run that was stopped is gone on with.
+
+    Raises:
+        KeyboardInterrupt: If it was stopped again.
+    """
     run = evaluate(
         agent,
-        "town05_tiny",
+        SUITE,
         routes=routes,
         output=output,
         resume=True,
         trust=True,
         isolate=False,  # the agents are the page's
     )
+    if not run.complete:
+        raise KeyboardInterrupt
     return run.driving_score
 
 
-def rows_of(title: str, code: str, folder: Path, routes: tuple[str, ...]) -> Iterator[str]:
+def rows_of(title: str, code: str, folder: Path, routes: list[str]) -> Iterator[str]:
     """The table's rows of an example: one for each agent that it trained."""
     spent_s = trained(code, folder)
     if spent_s is None:
@@ -130,6 +138,7 @@ def rows_of(title: str, code: str, folder: Path, routes: tuple[str, ...]) -> Ite
 def main(chosen: Learners) -> None:
     """Runs and scores them, and prints a row each."""
     page = (TOP / "docs" / "learning.md").read_text(encoding="utf-8")
+    routes = [spec.route_id for spec in load_suite(SUITE).specs()][:: chosen.every]
     print(HEAD, end="", flush=True)
     examples = EXAMPLE.findall(page)
     for title, code in examples:
@@ -137,7 +146,7 @@ def main(chosen: Learners) -> None:
             continue
         folder = folder_of(title, chosen.output)
         rows = ""
-        for row in rows_of(title, code, folder, chosen.routes):
+        for row in rows_of(title, code, folder, routes):
             print(row, end="", flush=True)
             rows += row
         if rows:
