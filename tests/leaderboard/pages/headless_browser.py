@@ -59,9 +59,9 @@ class Page:
         self.wait("document.readyState === 'complete' && 'shown' in document.body.dataset")
 
     def wait(self, condition: str) -> None:
-        """Waits, in the page, until an expression is true; an error after ten seconds."""
+        """Waits, in the page, until an expression is true; an error after a minute."""
         self.script(
-            "new Promise((done, fail) => { const until = Date.now() + 10000; const look = () => {"
+            "new Promise((done, fail) => { const until = Date.now() + 60000; const look = () => {"
             f"if ({condition}) done(); else if (Date.now() > until) fail(new Error('waited'));"
             "else setTimeout(look, 20); }; look(); })"
         )
