@@ -39,6 +39,7 @@ pictures:
     {{python}} docs/scripts/pictures.py
     {{python}} docs/scripts/sensor_pictures.py
     {{python}} docs/scripts/training_pictures.py
+    {{python}} -m docs.scripts.page_pictures
 
 # Tests of towns, world, sensors and environments
 di_envs *options:

@@ -71,6 +71,13 @@ def test_the_reference_has_every_option_edit_rule_and_agent(reference):
             assert f"`{name}`" in reference[f"reference/{page}.md"], (page, name)
 
 
+def test_every_file_that_a_page_links_becomes_a_page_whatever_its_kind(site, monkeypatch):
+    monkeypatch.setattr(site["tree"], "repository", lambda: "")
+    pages = site["tree"].tree_pages()
+    assert "````text\nabsl-py==" in pages["source/constraints.txt.md"]
+    assert "````python\n" in pages["source/examples/language_model_agent.py.md"]
+
+
 def test_the_reference_says_the_numbers_that_the_conventions_say(reference):
     text = reference["reference/observations.md"]
     assert (

@@ -1,9 +1,9 @@
 """Draws the pictures of docs/explaining.md from a run: situations, three drives, heads.
 
-python docs/scripts/response_pictures.py results/small --routes 24 9 17
+python docs/scripts/response_pictures.py results/mine --routes 24 9 17
 
-All drives of the run are looked at every half second, the chosen ones every 0.2 s; what was
-measured before is read from the run's folder.
+Drives are looked at every half second; what `driveinsight respond` has measured is read from the
+run's folder, and responses.md there holds the tables of the page.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from leaderboard.running.displays.work_bar import work_bar
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 COLOURS = 48  # a palette: a third of the size
-EVERY_S, CLOSER_S = 0.5, 0.2
+EVERY_S = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +43,9 @@ class Pictures:
     routes: tuple[str, str, str]
     """Three routes; the heads are of the first."""
 
+    among: tuple[str, ...] = ()
+    """Routes that the means are over; all of the run's if there are none."""
+
 
 def save(figure: Figure, name: str) -> None:
     """Writes a small PNG."""
@@ -54,14 +57,12 @@ def save(figure: Figure, name: str) -> None:
     print(path)
 
 
-def looked_at(
-    run: RunRecord, records: list[RouteRecord], folder: Path, every_s: float
-) -> list[DriveResponses]:
+def looked_at(run: RunRecord, records: list[RouteRecord], folder: Path) -> list[DriveResponses]:
     """Responses of these drives."""
     with work_bar("looking", "drives") as bar:
         task = bar.add_task("", total=len(records))
         found = []
-        for drive in measured(run, records, folder, every_s=every_s):
+        for drive in measured(run, records, folder, every_s=EVERY_S):
             found.append(drive)
             bar.advance(task)
     return found
@@ -71,15 +72,15 @@ def main(pictures: Pictures) -> None:
     """Measures what was not measured yet, and draws."""
     run = read_run(pictures.run)
     driven = [record for record in run.scored if record.steps]
-    save(
-        situation_figure(looked_at(run, driven, pictures.run / "responses", EVERY_S)), "situations"
-    )
-    first = {record.route_id: record for record in reversed(driven)}  # of its first seed
+    if pictures.among:
+        driven = [record for record in driven if record.route_id in pictures.among]
+    drives = looked_at(run, driven, pictures.run / "responses")
+    save(situation_figure(drives), "situations")
+    first = {drive.route_id: drive for drive in reversed(drives)}  # of its first seed
     chosen = [first[route] for route in pictures.routes]
-    drives = looked_at(run, chosen, pictures.run / "responses-closer", CLOSER_S)
-    for drive in drives:
+    for drive in chosen:
         save(gradient_figure(drive, marked_moments(drive)), f"route-{drive.route_id}")
-    save(head_figure(drives[0], marked_moments(drives[0])), "heads")
+    save(head_figure(chosen[0], marked_moments(chosen[0])), "heads")
 
 
 if __name__ == "__main__":

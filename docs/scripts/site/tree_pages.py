@@ -29,7 +29,7 @@ PAGES = {
     "benchmarks/README.md": "benchmarks.md",
 }
 _LINK = re.compile(r"(\]\()(?!https?:|mailto:|#)([^)#\s]+)(#[^)\s]*)?(\))")
-_SHOWN = {".py": "python", ".toml": "toml", ".cff": "yaml", "": "text"}
+_SHOWN = {".py": "python", ".toml": "toml", ".cff": "yaml"}  # others are text
 CARDS = """
 <div class="grid cards" markdown>
 
@@ -131,7 +131,8 @@ def _code_page(path: str) -> str:
         files = [(name, posixpath.relpath(_code_place(name), here)) for name in _inside(path)]
         return head + "\n".join(f"- [`{name}`]({place})" for name, place in files) + "\n"
     text = (TOP / path).read_text(encoding="utf-8")
-    return f"{head}````{_SHOWN[os.path.splitext(path)[1]]}\n{text}````\n"
+    language = _SHOWN.get(os.path.splitext(path)[1], "text")
+    return f"{head}````{language}\n{text}````\n"
 
 
 def not_in_menus(nav: Sequence[Any], more: Iterable[str]) -> list[str]:

@@ -13,6 +13,7 @@
     const ready = new Map(); // by place
     let wanted = null;
     canvas.style.aspectRatio = `${camera.width} / ${camera.height}`;
+    canvas.style.setProperty("--shape", camera.width / camera.height); // no higher than there is room
 
     function picture(i) {
       if (!ready.has(i)) {

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from di_envs.drawing.window import FASTEST, SLOWEST, Window
+from tests.di_envs.drawing.virtual_gamepad import virtual_gamepad
 
 FRAME = np.zeros((8, 8, 3), np.uint8)
 
@@ -96,5 +97,21 @@ def test_once_closed_nothing_more_is_drawn(window, how):
 
 
 def test_without_a_gamepad_there_is_none(window):
+    show(window)
+    assert window.pad() is None
+
+
+def test_a_gamepad_is_read_as_it_is_pushed_and_may_be_plugged_in_late(window):
+    show(window)
+    assert window.pad() is None
+    with virtual_gamepad() as gamepad:
+        show(window)
+        assert window.pad() == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
+        gamepad.push(stick=-1.0, right_trigger=0.75)
+        show(window)
+        assert window.pad() == pytest.approx((-1.0, 0.75, 0.0), abs=1e-4)
+        gamepad.push(stick=0.5, right_trigger=0.0, left_trigger=1.0)
+        show(window)
+        assert window.pad() == pytest.approx((0.5, 0.0, 1.0), abs=1e-4)
     show(window)
     assert window.pad() is None

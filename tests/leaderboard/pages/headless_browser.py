@@ -1,7 +1,11 @@
-"""A headless Chromium that tests drive through its debugging pipe, without a package for it."""
+"""A headless Chromium, driven through its debugging pipe, without a package for it.
+
+Tests look at pages with it, and docs/scripts/page_pictures.py photographs them.
+"""
 
 from __future__ import annotations
 
+import base64
 import fcntl
 import itertools
 import json
@@ -55,9 +59,9 @@ class Page:
         self.wait("document.readyState === 'complete' && 'shown' in document.body.dataset")
 
     def wait(self, condition: str) -> None:
-        """Waits, in the page, until an expression is true; an error after ten seconds."""
+        """Waits, in the page, until an expression is true; an error after a minute."""
         self.script(
-            "new Promise((done, fail) => { const until = Date.now() + 10000; const look = () => {"
+            "new Promise((done, fail) => { const until = Date.now() + 60000; const look = () => {"
             f"if ({condition}) done(); else if (Date.now() > until) fail(new Error('waited'));"
             "else setTimeout(look, 20); }; look(); })"
         )
@@ -74,6 +78,21 @@ class Page:
         """Presses a key."""
         for kind in ("keyDown", "keyUp"):
             self._call("Input.dispatchKeyEvent", type=kind, key=name)
+
+    def resize(self, width: int, height: int, *, dark: bool = False) -> None:
+        """Makes the window so large, by day or by night."""
+        self._call(
+            "Emulation.setDeviceMetricsOverride",
+            **{"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
+        )
+        self._call("Emulation.setScrollbarsHidden", hidden=True)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self._call("Emulation.setEmulatedMedia", features=[scheme])
+
+    def photograph(self) -> bytes:
+        """What the window shows, as a PNG."""
+        data: str = self._call("Page.captureScreenshot", format="png")["data"]
+        return base64.b64decode(data)
 
     def complaints(self) -> list[dict[str, Any]]:
         """Errors and warnings so far."""

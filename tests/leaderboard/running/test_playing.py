@@ -15,6 +15,7 @@ from leaderboard.replaying.watching import watch
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.playing import PlayEngine
 from leaderboard.running.runner import evaluate
+from tests.di_envs.drawing.virtual_gamepad import virtual_gamepad
 
 SUITE = load_suite("toy")
 ROUTE = SUITE.specs()[0].route_id
@@ -63,6 +64,25 @@ def test_what_was_pressed_is_what_was_driven_and_scored(played):
     assert controls[:5, 1] == pytest.approx([0.12, 0.24, 0.36, 0.48, 0.6])  # 1.2 a second
     assert np.all(controls[:, 2] == 0.0)
     assert record.trace[-1][1:3] != record.trace[0][1:3]
+
+
+def test_a_gamepad_drives_by_its_stick_and_triggers(tmp_path):
+    import pygame
+
+    asked = iter(range(1000))
+    pygame.display.init()
+    with virtual_gamepad() as gamepad, open(tmp_path / "said", "w") as said:
+        gamepad.push(stick=-1.0, right_trigger=0.5, left_trigger=0.25)
+        console = Console(file=said)
+        spec = RunSpec(agent="human:gamepad", options=OPTIONS)
+        engine = PlayEngine(spec, console, stopped=lambda: next(asked) >= 3)
+        press(*["+"] * 4)
+        run = evaluate(
+            spec, (0,), suite=SUITE, folder=tmp_path / "run", engine=engine, console=console
+        )
+        engine.close()
+    (record,) = run.routes
+    assert record.control_array() == pytest.approx(np.array([[0.5, -1.0, 0.25]] * 3), abs=1e-4)
 
 
 def test_the_score_stands_when_its_controls_are_driven_again(played):
