@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from agents.networks.route_frame import OnRoute, on_route
+from agents.networks.route_frame import OnRoute, in_the_way, on_route
 from di_envs.town.lanes import LightState
 from di_envs.world.kinds import ActorKind
 
@@ -25,8 +25,6 @@ INTEREST: Mapping[str, float] = MappingProxyType(
 )
 _ON_FOOT_OR_TWO_WHEELS = (ActorKind.WALKER, ActorKind.BICYCLE)
 _AT_ONCE = 4096  # moments that are looked at together
-_ASIDE_M = 2.0  # a stop line of the ego's own lane lies no farther from the way
-_SAME_WAY = 0.7  # cosine of the angle between it and the way, at least
 
 
 def draw_weights(rows: NDArray[np.void], interest: Mapping[str, float]) -> NDArray[np.float64]:
@@ -71,10 +69,8 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
 def line_m(rows: NDArray[np.void], name: str) -> NDArray[np.float32]:
     """(M, K) how far ahead each stop line of the ego's own lane is [m]; infinite for others."""
     seen = _on_route(rows, name)
-    aside_m, station_m = np.abs(seen.aside_m.numpy()), seen.station_m.numpy()
-    own = (rows[name][..., -1] > 0.0) & (aside_m < _ASIDE_M) & (station_m > -1.0)
-    own &= np.cos(seen.bend_rad.numpy()) > _SAME_WAY
-    return np.where(own, station_m, np.inf).astype(np.float32)
+    own = in_the_way(seen, same_way=True).numpy() & (rows[name][..., -1] > 0.0)
+    return np.where(own, seen.station_m.numpy(), np.inf).astype(np.float32)
 
 
 def _on_route(rows: NDArray[np.void], name: str) -> OnRoute:
