@@ -21,7 +21,7 @@ from di_envs.world.kinds import ActorKind
 
 # By what there is: how much more often a moment is drawn for it; 0 not more often
 INTEREST: Mapping[str, float] = MappingProxyType(
-    {"people": 8.0, "light": 8.0, "sign": 3.0, "crossing": 3.0}
+    {"people": 8.0, "light": 8.0, "green": 3.0, "sign": 3.0, "crossing": 3.0}
 )
 _ON_FOOT_OR_TWO_WHEELS = (ActorKind.WALKER, ActorKind.BICYCLE)
 _AT_ONCE = 4096  # moments that are looked at together
@@ -46,21 +46,22 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     """By name of `INTEREST`: (M,) whether there is such a thing near the way ahead.
 
     `people`: on foot or a bicycle, within 20 m along the way and 6 m beside it. `light`: of the
-    ego's lane within 40 m, not green, whether it rolls or waits. `sign`: of its lane within 15 m.
-    `crossing`: a vehicle within 30 m that moves across the way at 3 m/s or more.
+    ego's lane within 40 m, not green, whether it rolls or waits. `green`: such a light that is.
+    `sign`: of its lane within 15 m. `crossing`: a vehicle within 30 m that moves across the way at
+    3 m/s or more.
     """
     kind, there = rows["obstacles"][..., 7], rows["obstacles"][..., 8] > 0.0
     people = np.isin(kind, _ON_FOOT_OR_TWO_WHEELS)
     seen = _on_route(rows, "obstacles")
     station_m, aside_m = seen.station_m.numpy(), np.abs(seen.aside_m.numpy())
-    near = (station_m > 0.0) & (station_m < 20.0) & (aside_m < 6.0)
+    beside = (station_m > 0.0) & (station_m < 20.0) & (aside_m < 6.0)
     ahead = (station_m > 0.0) & (station_m < 30.0) & (aside_m < 15.0)
     crosses = ahead & (np.abs(seen.across_mps.numpy()) > 3.0)
-    stopping = rows["traffic_lights"][..., 3] >= LightState.YELLOW
-    light = (stopping & (line_m(rows, "traffic_lights") < 40.0)).any(axis=1)
+    shows, near = rows["traffic_lights"][..., 3], line_m(rows, "traffic_lights") < 40.0
     return {
-        "people": (there & people & near).any(axis=1),
-        "light": light,
+        "people": (there & people & beside).any(axis=1),
+        "light": (near & (shows >= LightState.YELLOW)).any(axis=1),
+        "green": (near & (shows == LightState.GREEN)).any(axis=1),
         "sign": (line_m(rows, "stop_signs") < 15.0).any(axis=1),
         "crossing": (there & ~people & crosses).any(axis=1),
     }
