@@ -106,6 +106,15 @@ AGENTS: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "driveinsight-town05": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="as driveinsight, with drives of Town05 in training, as the paper's main row",
+        version=1,
+        options={"shipped": "driveinsight-town05"},
+        data="driveinsight/weights/driveinsight-town05",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
     "route-only": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="a policy that knows its way and speed alone (a control for whoever claims to see)",

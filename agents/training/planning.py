@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from typing_extensions import Self
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets
@@ -29,6 +30,7 @@ from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
 from agents.training.turned_red import told_red, turned_red
 from agents.training.variation import Variation
+from agents.training.waiting import among_others, of_the_one_before
 from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.prompt import POSITION_LIMIT_M
@@ -45,10 +47,17 @@ class _Feigned:
     Attributes:
         speeds: Share of samples that are told wrong ones; see `told_speeds`.
         red: Share of samples before a green light that are told it is red; see `turned_red`.
+        others: Share of those that wait at a red one that wait among others; see `among_others`.
     """
 
     speeds: float = 0.0
     red: float = 0.0
+    others: float = 0.0
+
+    @classmethod
+    def of(cls, training: TrainConfig) -> Self:
+        """As a training has it."""
+        return cls(training.mistold, training.turned_red, training.among_others)
 
 
 _NOTHING = _Feigned()
@@ -111,7 +120,7 @@ class PlanningSamples:
         rows = self.taught[place.clip(max=len(self.taught) - 1)]
         right_m, turn_rad = set_aside(training.varied, training.batch, key)
         eyes = NO_NOISE if training.overfit else training.eyes
-        feigned = _NOTHING if training.overfit else _Feigned(training.mistold, training.turned_red)
+        feigned = _NOTHING if training.overfit else _Feigned.of(training)
         return self._batch(rows, right_m, turn_rad, eyes, key, share, feigned)
 
     def measured(self, number: int, share: slice) -> Batch:
@@ -142,6 +151,7 @@ class PlanningSamples:
     ) -> Batch:
         moments, valid = self.cache.rows[rows], self.valid[rows]
         red = turned_red(moments, valid, feigned.red, key)
+        waits = among_others(moments, valid, feigned.others, key)
         moved = _Moved(right_m, turn_rad)
         objects = moved.rows(_whole(moments["objects"]), velocity=True)
         signals = moved.rows(_whole(moments["signals"]))
@@ -152,6 +162,7 @@ class PlanningSamples:
             objects = np.where(looked, own, objects)
             own = moved.rows(_whole(told_red(seen["signals"], red)))
             signals = np.where(looked, own, signals)
+        objects = of_the_one_before(objects, waits)
         prompt = _prompt(moments, moved) | told_speeds(moments, feigned.speeds, key)
         inputs = Inputs(
             prompt={name: _tensor(value[share]) for name, value in prompt.items()},
