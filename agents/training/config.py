@@ -23,7 +23,7 @@ PLANNING: Mapping[str, Any] = MappingProxyType(
         "rendered": False,
         "interest": dict(INTEREST),
         "mistold": 0.4,
-        "turned_red": 0.5,
+        "turned_red": 0.3,
         "among_others": 0.6,
         "measured_moments": 512,
         "measured_every": 500,

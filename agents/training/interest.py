@@ -21,7 +21,7 @@ from di_envs.world.kinds import ActorKind
 
 # By what there is: how much more often a moment is drawn for it; 0 not more often
 INTEREST: Mapping[str, float] = MappingProxyType(
-    {"people": 8.0, "light": 8.0, "green": 3.0, "sign": 3.0, "crossing": 3.0, "merging": 16.0}
+    {"people": 8.0, "light": 8.0, "green": 12.0, "sign": 3.0, "crossing": 3.0, "merging": 16.0}
 )
 _ON_FOOT_OR_TWO_WHEELS = (ActorKind.WALKER, ActorKind.BICYCLE)
 _AT_ONCE = 4096  # moments that are looked at together
@@ -46,7 +46,7 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     """By name of `INTEREST`: (M,) whether there is such a thing near the way ahead.
 
     `people`: on foot or a bicycle, within 20 m along the way and 6 m beside it. `light`: of the
-    ego's lane within 40 m, not green, whether it rolls or waits. `green`: such a light that is.
+    ego's lane within 40 m, not green, whether it rolls or waits. `green`: one within 10 m that is.
     `sign`: of its lane within 15 m. `crossing`: a vehicle within 30 m that moves across the way at
     3 m/s or more. `merging`: a vehicle beside the ego, in the lane that its way changes to.
     """
@@ -60,11 +60,12 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     x, y = (np.float32(rows["obstacles"][..., n]) for n in (0, 1))
     beside_ego = (x > -8.0) & (x < 12.0) & (np.abs(y) > 2.2) & (np.abs(y) < 5.0)
     in_its_way = in_the_way(seen, same_way=True).numpy()
-    shows, near = rows["traffic_lights"][..., 3], line_m(rows, "traffic_lights") < 40.0
+    shows, ahead_m = rows["traffic_lights"][..., 3], line_m(rows, "traffic_lights")
+    near, at_line = ahead_m < 40.0, ahead_m < 10.0
     return {
         "people": (there & people & beside).any(axis=1),
         "light": (near & (shows >= LightState.YELLOW)).any(axis=1),
-        "green": (near & (shows == LightState.GREEN)).any(axis=1),
+        "green": (at_line & (shows == LightState.GREEN)).any(axis=1),
         "sign": (line_m(rows, "stop_signs") < 15.0).any(axis=1),
         "crossing": (there & ~people & crosses).any(axis=1),
         "merging": (there & ~people & beside_ego & in_its_way).any(axis=1),
