@@ -30,6 +30,7 @@ from agents.training.planning import PlanningSamples
 VARIANTS: Mapping[str, PlannerConfig] = MappingProxyType(
     {
         "a token a component, the ego's query": PlannerConfig(),
+        "a token a component and what comes next, the ego's query": PlannerConfig(next_row=True),
         "a token a component, a query a waypoint": PlannerConfig(each_waypoint=True),
         "a token a row, the ego's query": PlannerConfig(each_row=True),
         "a token a row, a query a waypoint": PlannerConfig(each_row=True, each_waypoint=True),

@@ -398,7 +398,7 @@ def test_what_a_page_names_wrongly_is_found():
         "agents.base.Agnt",
         "di_envs.routes",
     ]
-    assert misplaced("`load_agent` in `agents/__init__.py`, `EDITS` in\n`agents/base.py`") == [
+    assert misplaced("`load_agent` in `agents/loading.py`, `EDITS` in\n`agents/base.py`") == [
         "EDITS in agents/base.py"
     ]
 

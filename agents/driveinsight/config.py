@@ -141,6 +141,7 @@ class PlannerConfig:
         layers: Of the decoder, in which queries look at tokens.
         mixing_layers: In which tokens look at each other, before it.
         each_row: A token for each obstacle and signal, instead of one for all of them.
+        next_row: One more token for the obstacle, and the signal, that comes next along the route.
         each_waypoint: A query for each waypoint, instead of one for the ego.
         waypoints: Number of them.
         waypoint_dt_s: Time between them.
@@ -153,6 +154,7 @@ class PlannerConfig:
     layers: int = 3
     mixing_layers: int = 0
     each_row: bool = False
+    next_row: bool = False
     each_waypoint: bool = False
     waypoints: int = 8
     waypoint_dt_s: float = 0.5
@@ -248,14 +250,16 @@ class PolicyConfig:
 
 
 _WAY = ("command", "target_point", "routing", "speed", "speed_history")  # and how it moves along it
-_SEEING = PlannerConfig(dropout={**DROPOUT, BEV: 0.1}, together={})  # nothing else shows the world
-_TOLD = PlannerConfig(together={})  # without sensors there is nothing to make up for what is hidden
+# nothing else shows the world
+_SEEING = PlannerConfig(next_row=True, dropout={**DROPOUT, BEV: 0.1}, together={})
+# without sensors there is nothing to make up for what is hidden
+_TOLD = PlannerConfig(next_row=True, together={})
 
 CONFIGS: Mapping[str, PolicyConfig] = MappingProxyType(
     {
         config.name: config
         for config in (
-            PolicyConfig(name="driveinsight"),
+            PolicyConfig(name="driveinsight", planner=PlannerConfig(next_row=True)),
             PolicyConfig(
                 name="driveinsight-told", camera=None, lidar=None, memory_frames=0, planner=_TOLD
             ),

@@ -77,12 +77,16 @@ def anatomy_of(config: PolicyConfig) -> Anatomy:
 
 def token_spans(config: PlannerConfig) -> dict[str, Span]:
     """Where each component's tokens stand among all that the planner looks at."""
-    each = config.each_row
+
+    def tokens(rows: int) -> int:
+        """Of that many rows."""
+        return (rows if config.each_row else 1) + config.next_row
+
     counts = dict.fromkeys(TOKENS, 1) | {
-        "obstacles": OBSTACLES if each else 1,
-        "traffic_lights": LIGHTS if each else 1,
-        "stop_signs": STOP_SIGNS if each else 1,
-        BEV: (OBJECTS + SIGNALS if each else 2) + 1,
+        "obstacles": tokens(OBSTACLES),
+        "traffic_lights": tokens(LIGHTS),
+        "stop_signs": tokens(STOP_SIGNS),
+        BEV: tokens(OBJECTS) + tokens(SIGNALS) + 1,
     }
     spans, first = dict[str, Span](), 0
     for name, count in counts.items():

@@ -9,8 +9,15 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.driveinsight.config import PlannerConfig
 from agents.networks.mlp import mlp
-from agents.networks.route_frame import ROUTE_COLUMNS, along_route
+from agents.networks.route_frame import (
+    ROUTE_COLUMNS,
+    OnRoute,
+    along_route,
+    next_on_route,
+    on_route,
+)
 from agents.networks.sets import SetEncoder
 from di_envs.town.lanes import LightState
 from di_envs.town.map_chunks import POINTS, MapKind
@@ -34,59 +41,99 @@ def pose_features(pose: Tensor) -> Tensor:
 
 
 class RowEncoder(nn.Module):
-    """Rows to tokens: one for all of them, or one for each.
+    """Rows to tokens: one for all of them, or one for each; and one more for what comes next.
+
+    A light is one of up to a dozen in sight. What the ego does depends on the one that it comes to,
+    and a token for all of them has to tell that one's state from the others'.
 
     Args:
         inputs: Columns of a row.
         width: Of a token.
         each: A token a row, instead of one for all.
+        next_row: One more, for the row that the ego comes to first along the route.
+        same_way: Whether only a row that points along the route is come to.
     """
 
-    def __init__(self, inputs: int, width: int, *, each: bool) -> None:
+    def __init__(
+        self,
+        inputs: int,
+        width: int,
+        *,
+        each: bool,
+        next_row: bool = False,
+        same_way: bool = False,
+    ) -> None:
         super().__init__()
         self.rows = mlp(inputs, width) if each else SetEncoder(inputs, width)
-        self._each = each
+        self.next = mlp(inputs, width) if next_row else None
+        self._each, self._same_way = each, same_way
 
-    def forward(self, rows: Tensor, presence: Tensor) -> Tensor:
-        """(B, K, F) and (B, K) 0..1 to (B, K or 1, width); zeros for rows that are not there."""
+    def forward(self, rows: Tensor, presence: Tensor, seen: OnRoute) -> Tensor:
+        """Encodes.
+
+        Args:
+            rows: (B, K, F).
+            presence: (B, K) 0..1.
+            seen: The rows as the route sees them.
+
+        Returns:
+            (B, K or 1, width), and one token more for what comes next; zeros for rows that are not
+            there.
+        """
         if self._each:
             tokens: Tensor = self.rows(rows) * presence[:, :, None]
+        else:
+            tokens = self.rows(rows, presence)[:, None]
+        if self.next is None:
             return tokens
-        return self.rows(rows, presence)[:, None]
+        columns = torch.cat([rows, presence[:, :, None]], dim=2)
+        first = next_on_route(seen, presence, columns, same_way=self._same_way)
+        return torch.cat([tokens, (self.next(first[:, :-1]) * first[:, -1:])[:, None]], dim=1)
 
 
 class ObjectEncoder(nn.Module):
     """Vehicles and walkers, told or seen."""
 
-    def __init__(self, width: int, *, each: bool) -> None:
+    def __init__(self, config: PlannerConfig) -> None:
         super().__init__()
-        self.encode = RowEncoder(9 + len(ActorKind) + ROUTE_COLUMNS, width, each=each)
+        inputs = 9 + len(ActorKind) + ROUTE_COLUMNS
+        self.encode = RowEncoder(
+            inputs, config.width, each=config.each_row, next_row=config.next_row
+        )
 
     def forward(self, rows: Tensor, routing: Tensor) -> Tensor:
-        """(B, K, 9) with the columns of the prompt's obstacles to (B, K or 1, width)."""
+        """(B, K, 9) with the columns of the prompt's obstacles to (B, N, width)."""
+        seen = on_route(routing, rows[..., :3], rows[..., 5:7])
         features = [
             pose_features(rows),
             rows[..., 3:5] / _SIZE,
             rows[..., 5:7] / SPEED,
             rows[..., 8:],
             one_hot(rows[..., 7], len(ActorKind)),
-            along_route(routing, rows[..., :3], rows[..., 5:7]),
+            along_route(seen),
         ]
-        tokens: Tensor = self.encode(torch.cat(features, dim=-1), rows[..., 8])
+        tokens: Tensor = self.encode(torch.cat(features, dim=-1), rows[..., 8], seen)
         return tokens
 
 
 class SignalEncoder(nn.Module):
     """Stop lines with what they ask for, told or seen."""
 
-    def __init__(self, width: int, *, each: bool) -> None:
+    def __init__(self, config: PlannerConfig) -> None:
         super().__init__()
-        self.encode = RowEncoder(9 + ROUTE_COLUMNS, width, each=each)
+        self.encode = RowEncoder(
+            9 + ROUTE_COLUMNS,
+            config.width,
+            each=config.each_row,
+            next_row=config.next_row,
+            same_way=True,
+        )
 
     def forward(self, rows: Tensor, routing: Tensor) -> Tensor:
-        """(B, K, 8) with the columns of `Seen.signals` to (B, K or 1, width)."""
-        features = [pose_features(rows), rows[..., 3:], along_route(routing, rows[..., :3])]
-        tokens: Tensor = self.encode(torch.cat(features, dim=-1), rows[..., 7])
+        """(B, K, 8) with the columns of `Seen.signals` to (B, N, width)."""
+        seen = on_route(routing, rows[..., :3])
+        features = [pose_features(rows), rows[..., 3:], along_route(seen)]
+        tokens: Tensor = self.encode(torch.cat(features, dim=-1), rows[..., 7], seen)
         return tokens
 
 
@@ -121,11 +168,12 @@ class MapEncoder(nn.Module):
         chord = places[:, :, -1] - places[:, :, 0]
         heading = torch.atan2(chord[..., 1], chord[..., 0])
         middle = torch.cat([places[:, :, _MIDDLE], heading[..., None]], dim=-1)
+        seen = on_route(routing, middle)
         features = [
             (places / METRES).flatten(2),
             valid,
             one_hot(lines[..., 2].amax(dim=-1), len(MapKind)),
-            along_route(routing, middle),
+            along_route(seen),
         ]
-        tokens: Tensor = self.encode(torch.cat(features, dim=-1), valid.amax(dim=-1))
+        tokens: Tensor = self.encode(torch.cat(features, dim=-1), valid.amax(dim=-1), seen)
         return tokens

@@ -85,13 +85,13 @@ class PromptEncoder(nn.Module):
 
     def __init__(self, config: PlannerConfig) -> None:
         super().__init__()
-        width, each = config.width, config.each_row
+        width = config.width
         self.command = CommandEncoder(width)
         self.target_point = TargetPointEncoder(width)
         self.routing = RoutingEncoder(width)
         self.map = MapEncoder(width, each=False)
-        self.objects = ObjectEncoder(width, each=each)
-        self.signals = SignalEncoder(width, each=each)
+        self.objects = ObjectEncoder(config)
+        self.signals = SignalEncoder(config)
         self.speed = SpeedEncoder(width, 1)
         self.speed_history = SpeedEncoder(width, SPEED_HISTORY)
         self.taps = nn.ModuleDict({name: Tap() for name in COMPONENTS})

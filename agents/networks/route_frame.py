@@ -16,6 +16,9 @@ SPACING_M = 1.0  # between the route's points
 _METRES, _ASIDE_M, _CLOSE_M, _SPEED = 20.0, 5.0, 3.0, 10.0  # what numbers are divided by
 _MOST = 4.0  # up to which a scaled place aside is told apart
 _FAR_M2 = 1e6  # of a point that is not there
+_LANE_M = 2.0  # what lies no farther from the route than this is in the ego's way
+_SAME_WAY = 0.7  # cosine of the angle between a line of its own and the way, at least
+_THERE = 0.3  # who is seen with less certainty is no reason to stop for
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,20 +70,14 @@ def on_route(routing: Tensor, pose: Tensor, velocity: Tensor | None = None) -> O
     )
 
 
-def along_route(routing: Tensor, pose: Tensor, velocity: Tensor | None = None) -> Tensor:
+def along_route(seen: OnRoute) -> Tensor:
     """Rows as the route sees them, for a network.
-
-    Args:
-        routing: As for `on_route`, like the others.
-        pose: (B, K, 3).
-        velocity: (B, K, 2).
 
     Returns:
         (B, K, ROUTE_COLUMNS) scaled: station along the route, place to its right, closeness to it
         (1 on it, falling with distance), cosine and sine of the row's yaw seen from the route's,
         speed along and across it (to the right), 1. All zero where no point is valid.
     """
-    seen = on_route(routing, pose, velocity)
     columns = [
         seen.station_m / _METRES,
         (seen.aside_m / _ASIDE_M).clamp(-_MOST, _MOST),
@@ -92,3 +89,33 @@ def along_route(routing: Tensor, pose: Tensor, velocity: Tensor | None = None) -
         torch.ones_like(seen.valid),
     ]
     return torch.stack(columns, dim=2) * seen.valid[:, :, None]
+
+
+def in_the_way(seen: OnRoute, *, same_way: bool) -> Tensor:
+    """(B, K) whether rows lie on the route, from the ego's middle on.
+
+    Args:
+        seen: Rows as the route sees them.
+        same_way: Whether only those count that point along it, as a stop line of one's own does.
+    """
+    there = (seen.valid > 0.0) & (seen.station_m > -SPACING_M) & (seen.aside_m.abs() < _LANE_M)
+    return there & (seen.bend_rad.cos() > _SAME_WAY) if same_way else there
+
+
+def next_on_route(seen: OnRoute, presence: Tensor, rows: Tensor, *, same_way: bool) -> Tensor:
+    """The row that one comes to first along the route.
+
+    Args:
+        seen: (B, K) rows as the route sees them.
+        presence: (B, K) 0..1; who is less there than `_THERE` is not come to.
+        rows: (B, K, F) what is wanted of it.
+        same_way: As for `in_the_way`.
+
+    Returns:
+        (B, F) of that row; zeros where there is none.
+    """
+    there = in_the_way(seen, same_way=same_way) & (presence >= _THERE)
+    station_m = torch.where(there, seen.station_m, torch.inf)
+    nearest_m, first = station_m.min(dim=1)  # (B,)
+    found = rows.gather(1, first[:, None, None].expand(-1, 1, rows.shape[2]))[:, 0]
+    return torch.where(nearest_m[:, None].isfinite(), found, 0.0)

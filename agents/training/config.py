@@ -23,6 +23,8 @@ PLANNING: Mapping[str, Any] = MappingProxyType(
         "rendered": False,
         "interest": dict(INTEREST),
         "mistold": 0.4,
+        "turned_red": 0.3,
+        "among_others": 0.6,
         "measured_moments": 512,
         "measured_every": 500,
         "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
@@ -63,6 +65,10 @@ class TrainConfig:
             shown a moment; see `interest.reasons`.
         mistold: Share of the samples of a planner that learns alone that are told wrong speeds; see
             `planning.told_speeds`.
+        turned_red: Share of the samples of such a planner that stand or come before a green light
+            and are told, and shown, that it is red; see `turned_red`.
+        among_others: Share of the samples of such a planner that wait at a red light and are given
+            the surroundings of another one; see `waiting.among_others`.
         variation: How samples are varied.
         loss: Weights of the auxiliary terms.
         data: Digest of the drives; see `load_moments`.
@@ -91,6 +97,8 @@ class TrainConfig:
     eyes: EyeConfig = field(default_factory=EyeConfig)
     interest: Mapping[str, float] = field(default_factory=dict)
     mistold: float = 0.0
+    turned_red: float = 0.0
+    among_others: float = 0.0
     variation: Variation = field(default_factory=Variation)
     loss: LossConfig = field(default_factory=LossConfig)
     data: str = ""

@@ -15,7 +15,7 @@ from di_envs.town.lanes import LightState
 
 _STANDS_M = 2.5  # so far before a line whoever waits there stands, from the ego's middle
 _STARTED_M = 0.3  # who goes farther from there has started
-_PAST_M = 1.0  # who is nearer to the line than this is on its way over it
+PAST_M = 1.0  # who is nearer to the line than this is on its way over it
 _AT_ONCE = 4096  # moments that are looked at together
 
 
@@ -29,7 +29,7 @@ def foreseen(rows: NDArray[np.void]) -> NDArray[np.bool_]:
     for first in range(0, len(rows), _AT_ONCE):
         some = rows[first : first + _AT_ONCE]
         lights = some["traffic_lights"].astype(np.float64)
-        own = np.isfinite(line_m(some, "traffic_lights")) & (lights[..., 0] > _PAST_M)
+        own = np.isfinite(line_m(some, "traffic_lights")) & (lights[..., 0] > PAST_M)
         ahead_m = np.hypot(lights[..., 0], lights[..., 1])
         red_m = np.where(own & (lights[..., 3] == LightState.RED), ahead_m, np.inf)
         nearest_m = red_m.min(axis=1, keepdims=True)

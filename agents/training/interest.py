@@ -15,18 +15,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from agents.networks.route_frame import OnRoute, on_route
+from agents.networks.route_frame import OnRoute, in_the_way, on_route
 from di_envs.town.lanes import LightState
 from di_envs.world.kinds import ActorKind
 
 # By what there is: how much more often a moment is drawn for it; 0 not more often
 INTEREST: Mapping[str, float] = MappingProxyType(
-    {"people": 8.0, "light": 8.0, "sign": 3.0, "crossing": 3.0}
+    {"people": 8.0, "light": 8.0, "green": 12.0, "sign": 3.0, "crossing": 3.0, "merging": 16.0}
 )
 _ON_FOOT_OR_TWO_WHEELS = (ActorKind.WALKER, ActorKind.BICYCLE)
 _AT_ONCE = 4096  # moments that are looked at together
-_ASIDE_M = 2.0  # a stop line of the ego's own lane lies no farther from the way
-_SAME_WAY = 0.7  # cosine of the angle between it and the way, at least
 
 
 def draw_weights(rows: NDArray[np.void], interest: Mapping[str, float]) -> NDArray[np.float64]:
@@ -48,33 +46,37 @@ def reasons(rows: NDArray[np.void]) -> Mapping[str, NDArray[np.bool_]]:
     """By name of `INTEREST`: (M,) whether there is such a thing near the way ahead.
 
     `people`: on foot or a bicycle, within 20 m along the way and 6 m beside it. `light`: of the
-    ego's lane within 40 m, not green, whether it rolls or waits. `sign`: of its lane within 15 m.
-    `crossing`: a vehicle within 30 m that moves across the way at 3 m/s or more.
+    ego's lane within 40 m, not green, whether it rolls or waits. `green`: one within 10 m that is.
+    `sign`: of its lane within 15 m. `crossing`: a vehicle within 30 m that moves across the way at
+    3 m/s or more. `merging`: a vehicle beside the ego, in the lane that its way changes to.
     """
     kind, there = rows["obstacles"][..., 7], rows["obstacles"][..., 8] > 0.0
     people = np.isin(kind, _ON_FOOT_OR_TWO_WHEELS)
     seen = _on_route(rows, "obstacles")
     station_m, aside_m = seen.station_m.numpy(), np.abs(seen.aside_m.numpy())
-    near = (station_m > 0.0) & (station_m < 20.0) & (aside_m < 6.0)
+    beside = (station_m > 0.0) & (station_m < 20.0) & (aside_m < 6.0)
     ahead = (station_m > 0.0) & (station_m < 30.0) & (aside_m < 15.0)
     crosses = ahead & (np.abs(seen.across_mps.numpy()) > 3.0)
-    stopping = rows["traffic_lights"][..., 3] >= LightState.YELLOW
-    light = (stopping & (line_m(rows, "traffic_lights") < 40.0)).any(axis=1)
+    x, y = (np.float32(rows["obstacles"][..., n]) for n in (0, 1))
+    beside_ego = (x > -8.0) & (x < 12.0) & (np.abs(y) > 2.2) & (np.abs(y) < 5.0)
+    in_its_way = in_the_way(seen, same_way=True).numpy()
+    shows, ahead_m = rows["traffic_lights"][..., 3], line_m(rows, "traffic_lights")
+    near, at_line = ahead_m < 40.0, ahead_m < 10.0
     return {
-        "people": (there & people & near).any(axis=1),
-        "light": light,
+        "people": (there & people & beside).any(axis=1),
+        "light": (near & (shows >= LightState.YELLOW)).any(axis=1),
+        "green": (at_line & (shows == LightState.GREEN)).any(axis=1),
         "sign": (line_m(rows, "stop_signs") < 15.0).any(axis=1),
         "crossing": (there & ~people & crosses).any(axis=1),
+        "merging": (there & ~people & beside_ego & in_its_way).any(axis=1),
     }
 
 
 def line_m(rows: NDArray[np.void], name: str) -> NDArray[np.float32]:
     """(M, K) how far ahead each stop line of the ego's own lane is [m]; infinite for others."""
     seen = _on_route(rows, name)
-    aside_m, station_m = np.abs(seen.aside_m.numpy()), seen.station_m.numpy()
-    own = (rows[name][..., -1] > 0.0) & (aside_m < _ASIDE_M) & (station_m > -1.0)
-    own &= np.cos(seen.bend_rad.numpy()) > _SAME_WAY
-    return np.where(own, station_m, np.inf).astype(np.float32)
+    own = in_the_way(seen, same_way=True).numpy() & (rows[name][..., -1] > 0.0)
+    return np.where(own, seen.station_m.numpy(), np.inf).astype(np.float32)
 
 
 def _on_route(rows: NDArray[np.void], name: str) -> OnRoute:

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from typing_extensions import Self
 
 from agents.driveinsight.config import TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets
@@ -27,7 +28,9 @@ from agents.training.interest import draw_weights
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
+from agents.training.turned_red import told_red, turned_red
 from agents.training.variation import Variation
+from agents.training.waiting import among_others, of_the_one_before
 from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.prompt import POSITION_LIMIT_M
@@ -35,6 +38,29 @@ from di_envs.prompt import POSITION_LIMIT_M
 _ROWS, _ASIDE = stream_of("moments of a batch"), stream_of("moments set aside")
 _MISTOLD, _OFF = stream_of("speeds that are told wrong"), stream_of("how far off speeds are told")
 _OFF_MPS = 1.0  # standard deviation of a speed that is told wrong
+
+
+@dataclass(frozen=True)
+class _Feigned:
+    """What of a batch is told otherwise than it was.
+
+    Attributes:
+        speeds: Share of samples that are told wrong ones; see `told_speeds`.
+        red: Share of samples before a green light that are told it is red; see `turned_red`.
+        others: Share of those that wait at a red one that wait among others; see `among_others`.
+    """
+
+    speeds: float = 0.0
+    red: float = 0.0
+    others: float = 0.0
+
+    @classmethod
+    def of(cls, training: TrainConfig) -> Self:
+        """As a training has it."""
+        return cls(training.mistold, training.turned_red, training.among_others)
+
+
+_NOTHING = _Feigned()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +120,8 @@ class PlanningSamples:
         rows = self.taught[place.clip(max=len(self.taught) - 1)]
         right_m, turn_rad = set_aside(training.varied, training.batch, key)
         eyes = NO_NOISE if training.overfit else training.eyes
-        mistold = 0.0 if training.overfit else training.mistold
-        return self._batch(rows, right_m, turn_rad, eyes, key, share, mistold)
+        feigned = _NOTHING if training.overfit else _Feigned.of(training)
+        return self._batch(rows, right_m, turn_rad, eyes, key, share, feigned)
 
     def measured(self, number: int, share: slice) -> Batch:
         """The moments that it is measured on, one batch after the other: nothing is varied."""
@@ -121,9 +147,11 @@ class PlanningSamples:
         eyes: EyeConfig,
         key: int,
         share: slice,
-        mistold: float = 0.0,
+        feigned: _Feigned = _NOTHING,
     ) -> Batch:
-        moments = self.cache.rows[rows]
+        moments, valid = self.cache.rows[rows], self.valid[rows]
+        red = turned_red(moments, valid, feigned.red, key)
+        waits = among_others(moments, valid, feigned.others, key)
         moved = _Moved(right_m, turn_rad)
         objects = moved.rows(_whole(moments["objects"]), velocity=True)
         signals = moved.rows(_whole(moments["signals"]))
@@ -132,16 +160,17 @@ class PlanningSamples:
             seen, looked = self.own.rows[rows], self.own.looked[rows, None, None]
             own = moved.rows(_whole(seen["objects"]), velocity=True)
             objects = np.where(looked, own, objects)
-            signals = np.where(looked, moved.rows(_whole(seen["signals"])), signals)
-        prompt = _prompt(moments, moved) | told_speeds(moments, mistold, key)
+            own = moved.rows(_whole(told_red(seen["signals"], red)))
+            signals = np.where(looked, own, signals)
+        objects = of_the_one_before(objects, waits)
+        prompt = _prompt(moments, moved) | told_speeds(moments, feigned.speeds, key)
         inputs = Inputs(
             prompt={name: _tensor(value[share]) for name, value in prompt.items()},
             present=torch.ones(share.stop - share.start, len(TOKENS)),
             seen=Seen(objects=_tensor(objects[share]), signals=_tensor(signals[share])),
         )
-        valid = _whole(self.valid[rows])
         waypoints = moved.places(moments["waypoints"]) * valid[..., None]
-        targets = Targets(waypoints=_tensor(waypoints[share]), valid=_tensor(valid[share]))
+        targets = Targets(waypoints=_tensor(waypoints[share]), valid=_tensor(_whole(valid[share])))
         return Batch(
             inputs=(inputs,), targets=targets, begun=torch.ones(1, share.stop - share.start)
         )

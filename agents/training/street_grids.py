@@ -10,6 +10,7 @@ import math
 import random
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 Node = tuple[int, int]  # column, row
@@ -18,6 +19,9 @@ Edge = tuple[Node, Node]  # the lower node first
 KERB_RADIUS_M = 8.0  # from a crossing street's edge to where a street begins
 CORNER_M = 26.0
 BEND_RADIUS_M = 120.0
+LONG_M = 150.0  # streets that may swing aside, or lead over a viaduct
+VIADUCT_M = 5.0  # its height
+VIADUCT = (0.3, 0.55, 0.85)  # where a street is at that height, begins to go down, and is down
 TRIES = 200
 
 
@@ -35,6 +39,7 @@ class TownStyle:
         lights: Share of crossings with lights; Ts have them half as often.
         bend_m: How far the middle of a long street lies aside, at most.
         shift_m: How far a node lies from its place in the grid, at most.
+        raised: Share of the long streets that lead over a viaduct.
         vehicles: Of the traffic.
         walkers: Beside it.
     """
@@ -48,6 +53,7 @@ class TownStyle:
     lights: float = 0.6
     bend_m: float = 0.0
     shift_m: float = 2.0
+    raised: float = 0.0
     vehicles: int = 60
     walkers: int = 40
 
@@ -132,7 +138,8 @@ class _Grid:
                 "section": section,
                 "start": numbers[chain[0]],
                 "end": numbers[chain[-1]],
-                "points": self._points(chain, reach),
+                "points": (points := self._points(chain, reach)),
+                **self._raised(points),
             }
             for k, (chain, section) in enumerate(zip(chains, sections, strict=True))
         ]
@@ -206,11 +213,21 @@ class _Grid:
         points.append(_towards(places[-1], places[-2], reach[chain[-1], chain[-2]]))
         return [[round(value, 2) for value in point] for point in points]
 
+    def _raised(self, points: list[list[float]]) -> dict[str, list[list[float]]]:
+        """The heights of a street that leads over a viaduct; nothing of another."""
+        length_m = sum(math.dist(a[:2], b[:2]) for a, b in pairwise(points))
+        if self._style.raised == 0.0 or length_m < LONG_M:
+            return {}
+        if self._dice.random() >= self._style.raised:
+            return {}
+        up, off, down = (round(share * length_m, 1) for share in VIADUCT)
+        return {"profile": [[0.0, 0.0], [up, VIADUCT_M], [off, VIADUCT_M], [down, 0.0]]}
+
     def _bend(self, start: tuple[float, float], end: tuple[float, float]) -> list[list[float]]:
         """A long street swings aside and back: three corners between its ends."""
         length_m = math.dist(start, end)
         aside = self._dice.uniform(-1.0, 1.0) * self._style.bend_m
-        if length_m < 150.0 or abs(aside) < 2.0:
+        if length_m < LONG_M or abs(aside) < 2.0:
             return []
         along = (end[0] - start[0]) / length_m, (end[1] - start[1]) / length_m
         corners = []

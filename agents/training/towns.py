@@ -136,10 +136,28 @@ TRAINING_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
     }
 )
 
+# A town of which eyes learn what stands beside and under roads elsewhere: decks, rails, pillars
+_MADE_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
+    {
+        **TRAINING_TOWNS,
+        "viaducts": TownStyle(
+            columns=4,
+            rows=3,
+            block_m=(170.0, 240.0),
+            sections={"highway": _HIGHWAY, "avenue": _AVENUE, "parked": _PARKED},
+            lines=("highway", "avenue", "parked"),
+            lights=0.8,
+            bend_m=12.0,
+            raised=0.6,
+            vehicles=150,
+            walkers=60,
+        ),
+    }
+)
 
 # Towns that are shipped, and that policies may be trained in where somebody asks for it
 SHIPPED_TOWNS = ("town05",)
-KNOWN_TOWNS = (*TRAINING_TOWNS, *SHIPPED_TOWNS)
+KNOWN_TOWNS = (*_MADE_TOWNS, *SHIPPED_TOWNS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,7 +225,7 @@ def town_files(name: str, block: int = 0) -> TownFiles:
 def _made_files(name: str, block: int) -> TownFiles:
     """Of a made-up town; its map is made if it is not there."""
     first = _place(f"{name}-{_recipe_hash(name)}", "scenarios.json")
-    style = TRAINING_TOWNS[name]
+    style = _MADE_TOWNS[name]
     files = TownFiles(
         name=name,
         folder=_place(f"{first.name}-{block}", _ROUTE_FILE) if block else first,
@@ -261,7 +279,7 @@ def _suites_in(name: str) -> list[Suite]:
 @cache
 def _ends_taken(name: str) -> NDArray[np.float64]:
     """(K, 2, 2) x, y of the start and the end of every suite's route there [m]."""
-    if name in TRAINING_TOWNS:
+    if name in _MADE_TOWNS:
         return np.zeros((0, 2, 2))
     specs = [spec for suite in _suites_in(name) for spec in suite.specs()]
     return np.array([spec.positions[[0, -1], :2] for spec in specs])
@@ -269,7 +287,7 @@ def _ends_taken(name: str) -> NDArray[np.float64]:
 
 def _map(name: str) -> str:
     """The OpenDRIVE text of the first drawn town whose corners fit between its junctions."""
-    for table in street_tables(name, TRAINING_TOWNS[name]):
+    for table in street_tables(name, _MADE_TOWNS[name]):
         try:
             return town_text(plan_of(table))
         except ValueError:
@@ -278,7 +296,7 @@ def _map(name: str) -> str:
 
 
 def _recipe_hash(name: str) -> str:
-    recipe = json.dumps([VERSION, name, repr(TRAINING_TOWNS[name])])
+    recipe = json.dumps([VERSION, name, repr(_MADE_TOWNS[name])])
     return hashlib.blake2b(recipe.encode(), digest_size=6).hexdigest()
 
 

@@ -258,7 +258,7 @@ def moved(name: str, entry: Mapping[str, Any], driven: Driven, *, bits: bool) ->
         return _said(name, f"the world moved ({what})", "WORLD_VERSION in di_envs/world_version.py")
     what = _agent_moved(recorded_controls(entry), driven.controls, golden.tolerance)
     if what or CONTROLS in other:
-        version = f"the version of '{golden.agent}' in AGENTS of agents/__init__.py"
+        version = f"the version of '{golden.agent}' in AGENTS of agents/table.py"
         return _said(name, f"the agent moved ({what or 'other bits of controls'})", version)
     return ""
 

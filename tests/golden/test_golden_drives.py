@@ -79,7 +79,7 @@ def test_an_agent_that_acts_otherwise_is_told_from_a_world_that_moved(monkeypatc
     there = drive(GOLDEN[name], recorded_controls(RECORDED[name]))
     said = moved(name, RECORDED[name], there, bits=False)
     assert "the agent moved (at decision 0 it did" in said
-    assert "raise the version of 'constant' in AGENTS of agents/__init__.py" in said
+    assert "raise the version of 'constant' in AGENTS of agents/table.py" in said
     assert drives.RECORD_COMMAND in said
     with pytest.raises(ValueError, match="the agent moved"):
         recorded(name, RECORDED[name])

@@ -21,6 +21,7 @@ from tests.agents.driveinsight.random_inputs import awake, random_inputs
 
 PLANNERS = {
     "pooled": PlannerConfig(width=24, heads=2, layers=2),
+    "pooled and next": PlannerConfig(width=24, heads=2, layers=2, next_row=True),
     "rows": PlannerConfig(
         width=24, heads=2, layers=2, each_row=True, each_waypoint=True, mixing_layers=1
     ),

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from agents.networks.route_frame import ROUTE_COLUMNS, along_route
+from agents.networks.route_frame import ROUTE_COLUMNS, along_route, next_on_route, on_route
 
 
 def straight(points=50):
@@ -21,7 +21,7 @@ def straight(points=50):
 def seen(route, pose, velocity=None):
     rows = torch.tensor([[pose]])
     moves = None if velocity is None else torch.tensor([[velocity]])
-    return along_route(route, rows, moves)[0, 0].tolist()
+    return along_route(on_route(route, rows, moves))[0, 0].tolist()
 
 
 def test_a_car_on_the_route_is_told_by_its_station_and_its_speed_along_it():
@@ -67,3 +67,27 @@ def test_points_that_are_not_there_count_for_nothing_and_without_any_all_is_zero
     assert seen(route, (15.0, 0.0, 0.0)) == pytest.approx(seen(straight(10), (15.0, 0.0, 0.0)))
     route[0, :, 3] = 0.0
     assert seen(route, (15.0, 2.0, 0.3), (4.0, 1.0)) == [0.0] * ROUTE_COLUMNS
+
+
+def come_to(route, poses, presence=None, *, same_way=False):
+    """The place of the row that comes next among rows at these poses, x and y."""
+    rows = torch.tensor([poses])
+    there = torch.ones(1, len(poses)) if presence is None else torch.tensor([presence])
+    return next_on_route(on_route(route, rows), there, rows, same_way=same_way)[0, :2].tolist()
+
+
+def test_what_comes_next_is_the_nearest_row_ahead_that_lies_on_the_route():
+    behind, beside, near, far = (-4.0, 0.0, 0.0), (5.0, 3.5, 0.0), (9.0, 0.5, 0.0), (20.0, 0.0, 0.0)
+    assert come_to(straight(), [far, near, beside, behind]) == [9.0, 0.5]
+    # somebody who is hardly seen is not come to, nor is anybody without a route
+    assert come_to(straight(), [far, near], [1.0, 0.1]) == [20.0, 0.0]
+    nowhere = straight()
+    nowhere[..., 3] = 0.0
+    assert come_to(nowhere, [far, near]) == [0.0, 0.0]
+    assert come_to(straight(), [behind, beside]) == [0.0, 0.0]
+
+
+def test_a_line_across_the_way_is_nobodys_own():
+    across, own = (9.0, 0.5, math.pi / 2), (20.0, 0.0, 0.1)
+    assert come_to(straight(), [across, own], same_way=True) == [20.0, 0.0]
+    assert come_to(straight(), [across, own]) == [9.0, 0.5]

@@ -42,6 +42,7 @@ def somebody(kind, x, y, vx=0.0, vy=0.0):
         ({"traffic_lights": (25, 0, 0, RED, 1)}, {"light"}),
         ({"traffic_lights": (3, 0, 0, RED, 1), "speed_mps": 0.0}, {"light"}),
         ({"traffic_lights": (25, 0, 0, GREEN, 1)}, set()),
+        ({"traffic_lights": (8, 0, 0, GREEN, 1), "speed_mps": 0.0}, {"green"}),
         ({"traffic_lights": (25, -3.5, 0, RED, 1)}, set()),
         ({"traffic_lights": (25, 0, np.pi, RED, 1)}, set()),
         ({"stop_signs": (8, 0, 0, 1)}, {"sign"}),
@@ -66,6 +67,16 @@ def test_where_the_way_bends_reasons_bend_with_it():
     )
     assert not reasons(straight)["people"][0]
     assert reasons(bent)["people"][0]
+
+
+def test_a_vehicle_in_the_lane_that_the_way_changes_to_is_a_reason():
+    beside = a_moment(obstacles=somebody(ActorKind.CAR, 2, 3.5))
+    assert not reasons(beside)["merging"][0]
+    beside["routing"][0, 3:, 1] = 3.5  # from three metres ahead on in its lane
+    assert reasons(beside)["merging"][0]
+    far = a_moment(obstacles=somebody(ActorKind.CAR, 20, 3.5))
+    far["routing"] = beside["routing"]
+    assert not reasons(far)["merging"][0]
 
 
 def test_what_the_expert_then_does_is_no_reason():
