@@ -1,4 +1,4 @@
-"""The works that `step_rate.py` times: a drive replayed, and crowds in town without an ego.
+"""The works that `step_rate.py` times: a drive replayed, crowds without an ego, many worlds.
 
 Run as a script it does them on demand, in a process of its own: so two checkouts can take turns.
 It imports only what versions of long ago have too.
@@ -20,6 +20,7 @@ from agents import load_agent
 from di_envs.route_env import RouteEnv
 from di_envs.town.loading import load_town
 from di_envs.town.town import Town
+from di_envs.vector_env import RouteVectorEnv
 from di_envs.world.state import TICK_S
 from di_envs.world.world import World, WorldConfig
 
@@ -30,6 +31,7 @@ SEED = 0
 WARM_UP_S = 30.0  # of traffic, from a standing start, before anything is timed
 DRIVE_S = 60.0  # of a drive that is timed
 CROWD_TICKS = 600
+VECTORS = {16: 30, 64: 10}  # worlds stepped together in one thread: steps a round
 
 # How many things a work does, and what does them
 Work = tuple[int, Callable[[], Any]]
@@ -104,6 +106,31 @@ def growth_works() -> dict[str, Work]:
     }
 
 
+def vector_works() -> dict[str, Work]:
+    """Many worlds with an ego that stands, by their number; they go on from round to round."""
+    return {str(worlds): vector(worlds, steps) for worlds, steps in VECTORS.items()}
+
+
+def vector(worlds: int, steps: int) -> Work:
+    """Steps so many worlds so often."""
+    envs = RouteVectorEnv(
+        worlds,
+        threads=1,
+        suite="town05_long",
+        observations=("prompt",),
+        traffic=VEHICLES,
+        walkers=WALKERS,
+    )
+    envs.reset(seed=SEED)
+    stand = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (worlds, 1))
+
+    def work() -> None:
+        for _ in range(steps):
+            envs.step(stand)
+
+    return worlds * steps, work
+
+
 def main() -> None:
     """Does one round of each work named on the standard input, and says its processor time."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -112,7 +139,7 @@ def main() -> None:
     here = Path(di_envs.__file__).resolve().parents[1]
     if here != folder.resolve():
         sys.exit(f"expected di_envs of {folder}, but that of {here} was imported")
-    works = {**drive_works(prompt_env()), **growth_works()}
+    works = {**drive_works(prompt_env()), **growth_works(), **vector_works()}
     print("ready", flush=True)
     for line in sys.stdin:
         count, work = works[line.strip()]

@@ -13,7 +13,7 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from step_works import GROWTH
+from step_works import GROWTH, VECTORS
 from typing_extensions import Self
 
 WORKS = Path(__file__).with_name("step_works.py")
@@ -22,6 +22,7 @@ TITLES = {
     "world": "world tick, along a drive",
     "env": "`env.step`, observations `prompt`",
     **{f"{v} | {w}": f"world tick, {v} vehicles, {w} walkers, no ego" for v, w in GROWTH},
+    **{str(n): f"step of one of {n} worlds in a thread, observations `prompt`" for n in VECTORS},
 }
 
 

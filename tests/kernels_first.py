@@ -55,12 +55,17 @@ def drive_a_little() -> None:
     """The expert decides once, then the brake is held: these steps run nearly every kernel."""
     from agents import load_agent
     from di_envs.route_env import RouteEnv
+    from di_envs.vector_env import RouteVectorEnv
     from leaderboard.running.bound import light_limited_bound
 
-    env = RouteEnv(suite="toy", observations=SENSORS, traffic=4, walkers=4)
+    options = {"suite": "toy", "traffic": 4, "walkers": 4}
+    env = RouteEnv(observations=SENSORS, **options)
     observation, _ = env.reset(seed=0)
     expert = load_agent("expert")
     expert.act({**observation, "world": env.view}, expert.start(env.plan, 0))
     for _ in range(STEPS):
         env.step(np.array([0.0, 0.0, 1.0], np.float32))
+    worlds = RouteVectorEnv(1, observations=("prompt",), **options)
+    worlds.reset(seed=0)
+    worlds.step(np.array([[0.0, 0.0, 1.0]], np.float32))
     light_limited_bound(env.view.town, env.plan, 0)
