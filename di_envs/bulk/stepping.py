@@ -15,9 +15,10 @@ from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.numerics.bundle_rows import BundleRow
 from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
-from di_envs.observer import ObservationParts, fill_observation
+from di_envs.numerics.machine_code import MachineCode, call
+from di_envs.observer import ObservationParts
 from di_envs.world.state import CHECKPOINTS, EVENT_KINDS, TICK_S, State
-from di_envs.world.step import Scenery, Scratch, advance
+from di_envs.world.step import Scenery, Scratch
 
 # Rows of `Tally.numbers`, then one a term of the reward behind the first two of them
 COMPLETION, PENALTY, SCORE, TIME, JUNCTION, PROGRESS, OUTSIDE = range(7)
@@ -81,6 +82,8 @@ def make_tally(worlds: int, terms: int) -> Tally:
 
 @kernel
 def step_worlds(
+    advance: MachineCode,
+    look: MachineCode,
     worlds: BundleRow[WorldParts],
     scratch: Scratch,
     tally: Tally,
@@ -93,6 +96,8 @@ def step_worlds(
     """Steps the worlds [begin, end) that are not left out.
 
     Args:
+        advance: Of `di_envs.world.step.advance`.
+        look: Of `di_envs.observer.fill_observation`.
         worlds: All of them.
         scratch: Working memory, which no other thread uses meanwhile.
         tally: Of all of them; only rows of these worlds are read and written.
@@ -111,7 +116,8 @@ def step_worlds(
         state.throttle[_EGO] = tally.controls[index, 0]
         state.steer[_EGO] = tally.controls[index, 1]
         state.brake[_EGO] = tally.controls[index, 2]
-        tally.events[index] = advance(
+        tally.events[index] = call(
+            advance,
             state,
             world.scenery,
             scratch,
@@ -120,7 +126,7 @@ def step_worlds(
             ticks,
             world.event_rows,
         )
-        fill_observation(world.sight, _EGO, with_prompt, with_inertial)
+        call(look, world.sight, _EGO, with_prompt, with_inertial)
         _count(tally, world, index)
 
 

@@ -21,12 +21,13 @@ from di_envs.bulk.stepping import (
 )
 from di_envs.numerics.bundle_rows import BundleRow
 from di_envs.numerics.kernels import bind
-from di_envs.observer import ObservationParts
+from di_envs.numerics.machine_code import MachineCode
+from di_envs.observer import ObservationParts, fill_observation
 from di_envs.reward import standing_from, term_names
 from di_envs.route_env import RouteEnv
 from di_envs.world.building import capacity_for, make_scratch
 from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
-from di_envs.world.step import Scratch
+from di_envs.world.step import Scratch, advance
 from di_envs.world.world import event_of_row
 
 SHARES = 4  # a thread, so that one that is done early takes some more
@@ -59,6 +60,7 @@ class Worlds:
         self._scratches: list[Scratch] = []
         self._route_id = np.full(len(envs), "", object)
         self._world_seed = np.zeros(len(envs), np.int64)
+        self._codes: tuple[MachineCode, MachineCode]
         self._kernel: Any = None
 
     def ready(
@@ -106,7 +108,7 @@ class Worlds:
         observer = self._envs[0].observer
         try:
             self._kernel(
-                self._row, scratch, self._tally, begin, end, self._ticks,
+                *self._codes, self._row, scratch, self._tally, begin, end, self._ticks,
                 observer.with_prompt, observer.with_inertial,
             )  # fmt: skip
         finally:
@@ -154,10 +156,19 @@ class Worlds:
         """Sees to working memory for each thread, and to machine code."""
         while len(self._scratches) < threads:
             self._scratches.append(self._scratch())
-        if self._kernel is None:
-            self._kernel = bind(
-                step_worlds, self._row, self._scratches[0], self._tally, 0, 1, 1, True, True
-            )
+        if self._kernel is not None:
+            return
+        assert self._row is not None
+        world, scratch = self._row[0], self._scratches[0]
+        self._codes = (
+            MachineCode(
+                advance, world.state, world.scenery, scratch, 1, 1, self._ticks, world.event_rows
+            ),
+            MachineCode(fill_observation, world.sight, 0, True, True),
+        )
+        self._kernel = bind(
+            step_worlds, *self._codes, self._row, scratch, self._tally, 0, 1, 1, True, True
+        )
 
     def _scratch(self) -> Scratch:
         """Working memory that suffices for every route."""
