@@ -36,7 +36,7 @@ from step_works import (
     prompt_env,
     record_drive,
 )
-from two_checkouts import compare
+from two_checkouts import TITLES, compare
 
 from di_envs.numerics.kernels import cpu_capability
 from di_envs.route_env import RouteEnv
@@ -235,6 +235,9 @@ def main() -> None:
         metavar="FOLDER",
         help="instead of the parts: the checkout in this folder and this one, in turn",
     )
+    parser.add_argument(
+        "--works", nargs="+", choices=TITLES, default=list(TITLES), help="for --against: only these"
+    )
     arguments = parser.parse_args()
     if arguments.rounds < 1:
         parser.error("--rounds must be at least 1")
@@ -247,7 +250,7 @@ def main() -> None:
     print(f"{platform.system()}, CPU {cpu_capability()}, {os.cpu_count()} cores{load}.")
     print(f"Python {platform.python_version()}, numba {version('numba')}, numpy {np.__version__}.")
     if arguments.against is not None:
-        compare(arguments.against.resolve(), arguments.rounds)
+        compare(arguments.against.resolve(), arguments.rounds, arguments.works)
         return
     rate = measure_rates(bench) if "rate" in arguments.parts else None
     if "highway" in arguments.parts:

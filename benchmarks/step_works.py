@@ -1,4 +1,4 @@
-"""The works that `step_rate.py` times: a drive replayed, and crowds in town without an ego.
+"""The works that `step_rate.py` times: a drive replayed, crowds without an ego, many worlds.
 
 Run as a script it does them on demand, in a process of its own: so two checkouts can take turns.
 It imports only what versions of long ago have too.
@@ -7,6 +7,7 @@ It imports only what versions of long ago have too.
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
 import time
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from agents import load_agent
 from di_envs.route_env import RouteEnv
 from di_envs.town.loading import load_town
 from di_envs.town.town import Town
+from di_envs.vector_env import RouteVectorEnv
 from di_envs.world.state import TICK_S
 from di_envs.world.world import World, WorldConfig
 
@@ -30,6 +32,10 @@ SEED = 0
 WARM_UP_S = 30.0  # of traffic, from a standing start, before anything is timed
 DRIVE_S = 60.0  # of a drive that is timed
 CROWD_TICKS = 600
+# Steps a round, by how many worlds with an ego that stands are stepped in one thread; 1 is a single
+# environment
+STANDING = {1: 240, 16: 30, 64: 10}
+STAND = np.array([0.0, 0.0, 1.0], np.float32)
 
 # How many things a work does, and what does them
 Work = tuple[int, Callable[[], Any]]
@@ -104,6 +110,36 @@ def growth_works() -> dict[str, Work]:
     }
 
 
+def standing_works() -> dict[str, Work]:
+    """Worlds with an ego that stands, by their number."""
+    return {str(worlds): standing(worlds, steps) for worlds, steps in STANDING.items()}
+
+
+def standing(worlds: int, steps: int) -> Work:
+    """Steps so many worlds so often; they go on from round to round, one alone begins anew."""
+    made: Any = RouteEnv if worlds == 1 else functools.partial(RouteVectorEnv, worlds, threads=1)
+    env = made(suite="town05_long", observations=("prompt",), traffic=VEHICLES, walkers=WALKERS)
+    env.reset(seed=SEED)
+    snapshot = env.save_state() if worlds == 1 else None
+    action = STAND if worlds == 1 else np.tile(STAND, (worlds, 1))
+
+    def work() -> None:
+        if snapshot is not None:
+            env.restore_state(snapshot)
+        for _ in range(steps):
+            env.step(action)
+
+    return worlds * steps, work
+
+
+# What makes works, by the names of those that it makes
+MAKERS: dict[tuple[str, ...], Callable[[], dict[str, Work]]] = {
+    ("world", "env"): lambda: drive_works(prompt_env()),
+    tuple(f"{vehicles} | {walkers}" for vehicles, walkers in GROWTH): growth_works,
+    tuple(str(worlds) for worlds in STANDING): standing_works,
+}
+
+
 def main() -> None:
     """Does one round of each work named on the standard input, and says its processor time."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -112,10 +148,12 @@ def main() -> None:
     here = Path(di_envs.__file__).resolve().parents[1]
     if here != folder.resolve():
         sys.exit(f"expected di_envs of {folder}, but that of {here} was imported")
-    works = {**drive_works(prompt_env()), **growth_works()}
-    print("ready", flush=True)
+    works: dict[str, Work] = {}
     for line in sys.stdin:
-        count, work = works[line.strip()]
+        name = line.strip()
+        if name not in works:
+            works |= next(make() for names, make in MAKERS.items() if name in names)
+        count, work = works[name]
         begin = time.process_time()
         work()
         print((time.process_time() - begin) / count, flush=True)

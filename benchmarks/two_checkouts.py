@@ -10,10 +10,11 @@ import os
 import statistics
 import subprocess
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from step_works import GROWTH
+from step_works import GROWTH, STANDING
 from typing_extensions import Self
 
 WORKS = Path(__file__).with_name("step_works.py")
@@ -22,6 +23,7 @@ TITLES = {
     "world": "world tick, along a drive",
     "env": "`env.step`, observations `prompt`",
     **{f"{v} | {w}": f"world tick, {v} vehicles, {w} walkers, no ego" for v, w in GROWTH},
+    **{str(n): f"a world's `step`, of {n} in a thread, standing" for n in STANDING},
 }
 
 
@@ -45,11 +47,6 @@ class Checkout:
     def __exit__(self, *_: object) -> None:
         self._process.communicate()  # no more works: it ends
 
-    def get_ready(self) -> None:
-        """Waits until it has recorded its drive and warmed up its crowds."""
-        while self._line() != "ready":
-            pass
-
     def cpu_s(self, work: str) -> float:
         """Processor time of one thing, in a round of a work."""
         assert self._process.stdin is not None
@@ -65,18 +62,17 @@ class Checkout:
         return line.strip()
 
 
-def compare(against: Path, rounds: int) -> None:
+def compare(against: Path, rounds: int, works: Sequence[str]) -> None:
     """Prints what each work costs here and in another checkout.
 
     Args:
         against: The other checkout's folder.
         rounds: Pairs of rounds of each work; one before them is not counted.
+        works: Keys of `TITLES`.
     """
     with ExitStack() as stack:
         ours, theirs = (stack.enter_context(Checkout(folder)) for folder in (HERE, against))
-        ours.get_ready()
-        theirs.get_ready()
-        pairs: dict[str, list[tuple[float, float]]] = {work: [] for work in TITLES}
+        pairs: dict[str, list[tuple[float, float]]] = {work: [] for work in works}
         for k in range(rounds + 1):
             for work, own in pairs.items():
                 if k % 2:  # each is as often the first
@@ -89,8 +85,15 @@ def compare(against: Path, rounds: int) -> None:
     print("|---|---:|---:|---:|---:|---:|")
     for work, own in pairs.items():
         print(f"| {TITLES[work]} | {_cells(own)} |")
-    walk, crowded = (statistics.median(a for a, _ in pairs[f"0 | {n}"]) for n in (60, 120))
-    print(f"\nHere a tick with 120 walkers and no vehicles takes {crowded / walk:.2f} times 60's.")
+    print(_ratio(pairs, "0 | 120", "0 | 60"), _ratio(pairs, "16", "1"), _ratio(pairs, "64", "1"))
+
+
+def _ratio(pairs: dict[str, list[tuple[float, float]]], work: str, other: str) -> str:
+    """What a work takes of another one here, by the median of the rounds' ratios; if both ran."""
+    if not {work, other} <= pairs.keys():
+        return ""
+    found = [a / b for (a, _), (b, _) in zip(pairs[work], pairs[other], strict=True)]
+    return f"\nHere: {TITLES[work]}: {statistics.median(found):.2f} times {TITLES[other]}."
 
 
 def _cells(pairs: list[tuple[float, float]]) -> str:

@@ -4,17 +4,19 @@
 
 Prints rates and asserts nothing. Rates are by the wall clock, so other work on the machine hides
 what threads gain: `cores` says how many were at work, and rounds with fewer than there are threads
-say little. `CPU us` is processor time a step of one world, `alone` the part of it that one thread
-does while the others wait; `could be` is what these times allow: those of one environment by
-(alone + the rest / threads).
+say little. `of one` is the median of the rounds' ratios to one environment in the same round.
+`CPU us` is processor time a step of one world, `alone` the part of it that one thread does while
+the others wait; `could be` is what these times allow, likewise by rounds: that of one environment
+by (alone + the rest / threads).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,11 +26,13 @@ from rich.console import Console
 from rich.table import Table
 
 import di_envs  # noqa: F401 (registers the ids)
+from di_envs.bulk.threads import Crew
 from di_envs.numerics.kernels import cpu_capability
 from di_envs.vector_env import RouteVectorEnv
 
 GROUPS = {"prompt": ("prompt",), "camera, lidar, prompt": ("camera", "lidar", "prompt")}
-ROUND_STEPS = {"prompt": 1600, "camera, lidar, prompt": 96}  # of all worlds together
+ONE = "one environment"
+ROUND_STEPS = {"prompt": 1920, "camera, lidar, prompt": 128}  # of all worlds together
 CONTROL = np.array([0.0, 0.0, 1.0], np.float32)  # stands, so that no world ends
 
 
@@ -41,22 +45,41 @@ class Round:
     cpu_us: float
     alone_us: float
 
+    def bound_us(self, threads: int) -> float:
+        """What a step would take if each thread had a core to itself."""
+        return self.alone_us + (self.cpu_us - self.alone_us) / threads
 
-class Clocked(RouteVectorEnv):
+
+class Clocked(Crew):
     """Knows how much processor time is spent on what its threads share."""
 
     shared_s = 0.0
 
-    def _each(self, indices: Iterable[int], work: Callable[[int], None]) -> None:
+    def each(self, jobs: Sequence[Callable[[], None]]) -> None:
+        """Does all jobs by the clock."""
         begin = time.process_time()
-        super()._each(indices, work)
+        super().each(jobs)
         self.shared_s += time.process_time() - begin
+
+
+class ClockedWorlds(RouteVectorEnv):
+    """Many worlds whose threads are clocked."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._crew = Clocked(self.threads)
+
+    @property
+    def crew(self) -> Clocked:
+        """The threads."""
+        return self._crew
 
 
 def timed(env: Any, action: Any, times: int, worlds: int) -> Round:
     """Steps some worlds so often, from the start of their episodes."""
     env.reset(seed=0)
-    env.shared_s = 0.0
+    crew = env.crew if isinstance(env, ClockedWorlds) else Clocked(1)
+    crew.shared_s = 0.0
     wall, cpu = time.perf_counter(), time.process_time()
     for _ in range(times):
         env.step(action)
@@ -66,47 +89,44 @@ def timed(env: Any, action: Any, times: int, worlds: int) -> Round:
         steps_per_s=steps / wall,
         cores=cpu / wall,
         cpu_us=1e6 * cpu / steps,
-        alone_us=1e6 * (cpu - env.shared_s) / steps,
+        alone_us=1e6 * (cpu - crew.shared_s) / steps,
     )
 
 
-def measure(groups: str, env_id: str, worlds: int, rounds: int) -> Table:
+def measure(groups: str, env_id: str, numbers: Sequence[int], rounds: int) -> Table:
     """One environment and many worlds, taking turns."""
     options = {"observations": GROUPS[groups]}
-    made: dict[str, tuple[Any, Any, int]] = {}  # environment, action, worlds
-    threads_of = {"one environment": 1}
-    single = gymnasium.make(env_id, **options).unwrapped
-    made["one environment"] = single, CONTROL, 1
-    for threads in (1, 2):
-        many = Clocked(worlds, threads=threads, **{**gymnasium.spec(env_id).kwargs, **options})
+    given = {**gymnasium.spec(env_id).kwargs, **options}
+    made: dict[str, tuple[Any, Any, int, int]] = {}  # environment, action, worlds, threads
+    made[ONE] = gymnasium.make(env_id, **options).unwrapped, CONTROL, 1, 1
+    for worlds, threads in itertools.product(numbers, (1, 2)):
+        many = ClockedWorlds(worlds, threads=threads, **given)
         name = f"{worlds} worlds, {threads} thread{'s' if threads > 1 else ''}"
-        made[name] = many, np.tile(CONTROL, (worlds, 1)), worlds
-        threads_of[name] = threads
+        made[name] = many, np.tile(CONTROL, (worlds, 1)), worlds, threads
     results: dict[str, list[Round]] = {name: [] for name in made}
     for _ in range(rounds + 1):
-        for name, (env, action, count) in made.items():
-            results[name].append(timed(env, action, ROUND_STEPS[groups] // count, count))
+        for name, (env, action, worlds, _) in made.items():
+            results[name].append(timed(env, action, ROUND_STEPS[groups] // worlds, worlds))
     columns = ("", "steps/s", "best", "of one", "cores", "CPU us", "alone", "could be")
     table = Table(*columns, title=groups)
-    best_alone = max(result.steps_per_s for result in results["one environment"][1:])
-    one_us = statistics.median(result.cpu_us for result in results["one environment"][1:])
+    alone = results[ONE][1:]  # the first round warms up
     for name, found in results.items():
-        counted = found[1:]  # the first round warms up
-        rates = [result.steps_per_s for result in counted]
-        cpu_us = statistics.median(result.cpu_us for result in counted)
-        alone_us = statistics.median(result.alone_us for result in counted)
-        bound_us = alone_us + (cpu_us - alone_us) / threads_of[name]
-        table.add_row(
-            name,
-            f"{statistics.median(rates):.0f}",
-            f"{max(rates):.0f}",
-            f"{max(rates) / best_alone:.2f}",
-            f"{max(result.cores for result in counted):.2f}",
-            f"{cpu_us:.0f}",
-            f"{alone_us:.0f}" if threads_of[name] > 1 else "",
-            f"{one_us / bound_us:.2f}",
-        )
+        table.add_row(name, *cells(found[1:], alone, made[name][3]))
     return table
+
+
+def cells(found: Sequence[Round], alone: Sequence[Round], threads: int) -> tuple[str, ...]:
+    """Medians of rounds, and of their ratios to those of one environment, round by round."""
+    median, pairs = statistics.median, list(zip(found, alone, strict=True))
+    return (
+        f"{median(own.steps_per_s for own in found):.0f}",
+        f"{max(own.steps_per_s for own in found):.0f}",
+        f"{median(own.steps_per_s / one.steps_per_s for own, one in pairs):.2f}",
+        f"{max(own.cores for own in found):.2f}",
+        f"{median(own.cpu_us for own in found):.0f}",
+        f"{median(own.alone_us for own in found):.0f}" if threads > 1 else "",
+        f"{median(one.cpu_us / own.bound_us(threads) for own, one in pairs):.2f}",
+    )
 
 
 def main() -> None:
@@ -115,12 +135,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--env", default="DriveInsight-Town05Long-v1")
-    parser.add_argument("--worlds", type=int, default=16)
+    parser.add_argument("--worlds", type=int, nargs="+", default=[16, 64])
     parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--groups", nargs="+", choices=list(GROUPS), default=list(GROUPS))
     arguments = parser.parse_args()
     console = Console()
     console.print(f"CPU {cpu_capability()}")
-    for groups in GROUPS:
+    for groups in arguments.groups:
         console.print(measure(groups, arguments.env, arguments.worlds, arguments.rounds))
 
 

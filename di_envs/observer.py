@@ -85,6 +85,8 @@ class Observer:
 
     Attributes:
         weather: What cameras see from the next `start` on: a preset, or that of the route's file.
+        with_prompt: Whether it writes the prompt.
+        with_inertial: Whether it writes the inertial sensors.
     """
 
     def __init__(
@@ -114,7 +116,7 @@ class Observer:
             radars: Its radars; for group `radar`.
             gnss_origin: Latitude and longitude [deg] of x = y = 0; None for the town's.
         """
-        self._with_prompt, self._with_inertial = "prompt" in groups, "inertial" in groups
+        self.with_prompt, self.with_inertial = "prompt" in groups, "inertial" in groups
         self._with_odometry = "odometry" in groups
         self._rig = rig_of(cameras) if "camera" in groups else None
         self._lidar_config = lidar_of(lidar) if "lidar" in groups else None
@@ -153,7 +155,7 @@ class Observer:
             gnss=np.zeros(3, np.float64),
         )
         self._fill = bind(
-            fill_observation, self._sight, self._ego, self._with_prompt, self._with_inertial
+            fill_observation, self._sight, self._ego, self.with_prompt, self.with_inertial
         )
         self._cameras: CameraRig | None = None
         if self._rig is not None:
@@ -171,6 +173,11 @@ class Observer:
         if self._radar_configs:
             self._radars = Radars(self._town, self._radar_configs, self._ego)
             self._radars.start(view)
+
+    @property
+    def sight(self) -> ObservationParts:
+        """What its kernel reads and writes: another one after each `start`."""
+        return self._sight
 
     def change_weather(self, weather: str) -> None:
         """What cameras see from now on; for much less than another `start`."""
@@ -204,7 +211,7 @@ class Observer:
         """The present observation; every array is a fresh one."""
         observation: dict[str, Any] = {}
         self.write_tables()
-        if self._with_prompt:
+        if self.with_prompt:
             observation.update(prompt_observation(self._sight.prompt))
             observation["command"] = observation["command"][0]
         observation.update(self.measure())
@@ -212,16 +219,16 @@ class Observer:
 
     def write_tables(self) -> None:
         """Writes the prompt and the inertial sensors to their buffers: the first part of a look."""
-        self._fill(self._sight, self._ego, self._with_prompt, self._with_inertial)
+        self._fill(self._sight, self._ego, self.with_prompt, self.with_inertial)
 
     def measure(self) -> dict[str, Any]:
         """What sensors see: the second part of a look, all of it but the prompt."""
         observation: dict[str, Any] = {}
         sight = self._sight
-        if self._with_inertial:
+        if self.with_inertial:
             observation["imu"] = sight.imu.copy()
             observation["gnss"] = sight.gnss.copy()
-            if not self._with_prompt:
+            if not self.with_prompt:
                 speed_mps = float(sight.state.speed[self._ego])
                 speed_mps = min(max(speed_mps, -SPEED_LIMIT_MPS), SPEED_LIMIT_MPS)
                 observation["speed"] = np.array([speed_mps], np.float32)

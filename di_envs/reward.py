@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from di_envs.numerics.arrays import Float64, Int32
 from di_envs.rules.penalties import Penalties
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.state import EventKind, State
@@ -27,12 +28,32 @@ class Standing(NamedTuple):
 
 def standing_of(state: State, ego: int) -> Standing:
     """An ego's standing in the present state."""
-    outside_m = float(state.outside_m[ego])
-    # Counted over route points of its own, as CARLA does: nearly, not exactly, the metres done.
-    share = min(outside_m / float(state.outside_done_m[ego]), 1.0) if outside_m > 0.0 else 0.0
-    counts = tuple(state.counts[ego].tolist())
-    pace_shares = tuple(state.pace_share[ego].tolist()) if counts[EventKind.MIN_SPEED] else ()
-    return Standing(float(state.route_done_m[ego]), share, counts, pace_shares)
+    return standing_from(
+        float(state.route_done_m[ego]),
+        float(state.outside_m[ego]),
+        float(state.outside_done_m[ego]),
+        state.counts[ego],
+        state.pace_share[ego],
+    )
+
+
+def standing_from(
+    done_m: float, outside_m: float, counted_m: float, counts: Int32, pace_share: Float64
+) -> Standing:
+    """A standing out of what a state holds of an ego.
+
+    Args:
+        done_m: Metres of the dense route completed.
+        outside_m: Of them outside the lanes or against them …
+        counted_m: … over which those were counted: over route points of their own, as CARLA does,
+            which are nearly, not exactly, the metres done.
+        counts: (EVENT_KINDS,) events so far.
+        pace_share: (CHECKPOINTS,) of the traffic's mean speed.
+    """
+    share = min(outside_m / counted_m, 1.0) if outside_m > 0.0 else 0.0
+    events = tuple(counts.tolist())
+    pace_shares = tuple(pace_share.tolist()) if events[EventKind.MIN_SPEED] else ()
+    return Standing(done_m, share, events, pace_shares)
 
 
 def inside_metres(standing: Standing) -> float:
@@ -48,6 +69,11 @@ def infraction_penalty(standing: Standing, penalties: Penalties) -> float:
 def score_metres(standing: Standing, penalties: Penalties) -> float:
     """The driving score in metres of the route: what a step's reward is the growth of."""
     return inside_metres(standing) * infraction_penalty(standing, penalties)
+
+
+def term_names(penalties: Penalties) -> tuple[str, ...]:
+    """Names of the reward's terms, in their order."""
+    return ("progress", "outside_lanes", *penalties.no_terms)
 
 
 def reward_terms(before: Standing, after: Standing, penalties: Penalties) -> dict[str, float]:

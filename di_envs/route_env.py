@@ -9,18 +9,16 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 from typing_extensions import Self
 
 from di_envs.actions.checked import action_space, checked_action
 from di_envs.config import WEATHERS, check_name
 from di_envs.copying import Copyable
-from di_envs.course import load_course
+from di_envs.course import Course, load_course
 from di_envs.drawing.screen import Screen, check_render_mode, render_modes
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.observer import Observer
 from di_envs.planned_routes import PlannedRoutes
-from di_envs.presets import Form
 from di_envs.reward import Standing, standing_of
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import Event, Snapshot, World, WorldView
@@ -119,6 +117,16 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
     def planned(self) -> PlannedRoutes:
         """The routes, those of their file that cannot be planned, and what is to be known."""
         return self._course.planned
+
+    @property
+    def course(self) -> Course:
+        """Town, routes and how driving is counted; shared by twins, and never changed."""
+        return self._course
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no episode to step: it is over, or none was begun."""
+        return self._over
 
     @property
     def view(self) -> WorldView:
@@ -252,16 +260,6 @@ class RouteEnv(Copyable, gymnasium.Env[Observation, np.ndarray[Any, Any]]):
         check_name(weather, WEATHERS, "weather")
         self._observer.weather = weather
         self._observer.start(self.view)
-
-    @property
-    def form(self) -> Form:
-        """In which observations are shown."""
-        return self._course.form
-
-    @property
-    def seen_space(self) -> spaces.Dict:
-        """The space of observations as they are, whatever the form."""
-        return self._course.seen_space()
 
     @property
     def observer(self) -> Observer:

@@ -1,35 +1,34 @@
 """`RouteVectorEnv`: many routes driven at once, as a native Gymnasium vector environment.
 
-The worlds share one town with all its tables, and threads share out the worlds: kernels hold no
-Python lock, so they run side by side in one process, without copies between processes. Each world
-is a `RouteEnv` of its own, so what comes out is bit for bit what single ones give, for any number
-of threads. Threads do what needs no Python, advance worlds and look at them; rewards and `info` are
-made for all once they are through, as threads that keep asking for Python's lock gain nothing.
+The worlds share one town with all its tables, and threads share out the worlds: one call of a
+kernel steps many of them, looks at them and works out rewards and the numbers of `info`, and holds
+no Python lock, so that threads run side by side in one process (`di_envs/bulk/`). Each world is
+that of a `RouteEnv`, so what comes out is bit for bit what single ones give, for any number of
+threads. What the rules count in a step, which is rare, is left to these environments.
 """
 
 from __future__ import annotations
 
 import copy
-import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from typing_extensions import Self
 
-from di_envs.actions.checked import HIGH, LOW, checked_action
+from di_envs.bulk.arguments import check_counts, checked_actions, checked_mask, checked_seeds
+from di_envs.bulk.infos import Infos, infos_of
+from di_envs.bulk.rows import WorldRows
+from di_envs.bulk.threads import Crew, cores
+from di_envs.bulk.worlds import Worlds
 from di_envs.copying import Copyable
 from di_envs.presets import Form
-from di_envs.reward import Standing
 from di_envs.route_env import Info, Observation, RouteEnv, RouteEnvSnapshot
-from di_envs.vector_rows import WorldRows, batched_infos
-from di_envs.world.world import Event
 
 Steps = tuple[
     Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
@@ -89,15 +88,9 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
             ValueError: If a number is not positive, or an option is refused.
         """
         before = frozenset(vars(self))
-        threads = min(_cores(), num_envs) if threads is None else threads
+        threads = min(cores(), num_envs) if threads is None else threads
         steps = 1 if max_episode_steps is None else max_episode_steps
-        for name, value in (
-            ("num_envs", num_envs),
-            ("threads", threads),
-            ("max_episode_steps", steps),
-        ):
-            if value < 1:
-                raise ValueError(f"{name} must be at least 1; got {value!r}.")
+        check_counts(num_envs=num_envs, threads=threads, max_episode_steps=steps)
         if render_mode == "human":
             raise ValueError(
                 "Many worlds have no window: use render_mode='rgb_array', or gymnasium.make for "
@@ -105,7 +98,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
             )
         first = RouteEnv(render_mode=render_mode, **options)
         self.envs = (first, *(first.twin() for _ in range(num_envs - 1)))
-        self.num_envs, self.threads = num_envs, threads
+        self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
@@ -113,12 +106,10 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         self.single_action_space = first.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._looks = self._rows_of(self.envs)
+        self._ended: NDArray[np.bool_]
         self._limit = max_episode_steps
-        self._steps = [0] * num_envs
-        self._ended = np.zeros(num_envs, bool)
-        self._pool: ThreadPoolExecutor | None = None
-        self._pool_of = 0
+        self._crew = Crew(threads)
+        self._prepare()
         made_with = {
             **{"num_envs": num_envs, "threads": threads, "autoreset_mode": autoreset_mode},
             **{"max_episode_steps": max_episode_steps, "render_mode": render_mode},
@@ -142,21 +133,16 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         Raises:
             ValueError: If the seeds or the mask have another length, or an option is refused.
         """
-        seeds = self._seeds(seed)
+        seeds = checked_seeds(seed, self.num_envs)
         left = dict(options or {})
-        mask = self._mask(left.pop("reset_mask", None))
-        chosen = np.flatnonzero(mask).tolist()
-        infos: list[Info] = [{}] * self.num_envs
+        mask = checked_mask(left.pop("reset_mask", None), self.num_envs)
+        begun: dict[int, Info] = {}
         rows = self._looks.fresh()
-
-        def begin(index: int) -> None:
-            infos[index] = self._begin(index, seeds[index], left, rows)
-
-        self._each(chosen, begin)
+        self._crew.each(self._beginnings(np.flatnonzero(mask), rows, begun, seeds, left))
         for index in np.flatnonzero(~mask).tolist():
             self._looks.look(rows, index)
         self._looks.add_prompts(rows)
-        return self._form.of(rows), self._infos(infos, chosen)
+        return self._form.of(rows), infos_of(begun, self.num_envs, self._add_info)
 
     def step(self, actions: NDArray[np.float32]) -> Steps:
         """Steps every world; those whose episode has ended are reset as `autoreset_mode` says.
@@ -168,39 +154,31 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
             ValueError: If an action is refused, before any world has moved.
             gymnasium.error.ResetNeeded: If a world that has ended is not reset automatically.
         """
-        next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
-        resets = self._ended if next_step else np.zeros(self.num_envs, bool)
-        controls = self._checked(actions, resets)
-        stepped = np.flatnonzero(~resets).tolist()
-        before = {index: self.envs[index].hold(controls[index]) for index in stepped}
-        events: dict[int, list[Event]] = {}
-        infos: list[Info] = [{}] * self.num_envs
-        rows, ticks = self._looks.fresh(), self.envs[0].config.control_ticks
-
-        def advance(index: int) -> None:
-            if resets[index]:
-                infos[index] = self._begin(index, None, {}, rows)
-            else:
-                events[index] = self.envs[index].world.run(ticks)
-                self._looks.look(rows, index)
-
-        self._each(range(self.num_envs), advance)
+        resets = self._ended & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        controls = checked_actions(actions, resets)
+        shares = self._worlds.ready(controls, resets, self.threads)
+        begun: dict[int, Info] = {}
+        rows = self._looks.fresh()
+        jobs = self._beginnings(np.flatnonzero(resets), rows, begun)
+        jobs += [partial(self._advance, begin, end, resets, rows) for begin, end in shares]
+        self._crew.each(jobs)
         self._looks.add_prompts(rows)
-        rewards = np.zeros(self.num_envs)
-        ended = np.zeros((2, self.num_envs), bool)  # terminated, truncated
-        for index in stepped:
-            outcome = self._outcome(index, before[index], events[index])
-            rewards[index], ended[0, index], ended[1, index], infos[index] = outcome
-        self._ended = ended[0] | ended[1]
-        batched = self._restart(rows, infos) if self._restarts() else {}
-        batched |= self._infos(infos, range(self.num_envs))
-        return self._form.of(rows), rewards, ended[0], ended[1], batched
+        rewards, terminated, truncated, infos = self._worlds.outcome()
+        self._steps[~resets] += 1
+        if self._limit is not None:
+            truncated |= ~resets & (self._steps >= self._limit)
+        self._ended = terminated | truncated
+        batched = self._restart(rows, infos, begun) if self._restarts() else {}
+        for index, info in begun.items():
+            infos.put(index, info)
+        batched |= infos.batched()
+        return self._form.of(rows), rewards, terminated, truncated, batched
 
     def save_state(self) -> VectorSnapshot:
         """A value from which `restore_state` brings everything back. See `di_envs.save`."""
         return VectorSnapshot(
             worlds=tuple(env.save_state() for env in self.envs),
-            steps=tuple(self._steps),
+            steps=tuple(self._steps.tolist()),
             ended=tuple(self._ended.tolist()),
         )
 
@@ -218,7 +196,7 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
             )
         for env, world in zip(self.envs, snapshot.worlds, strict=True):
             env.restore_state(world)
-        self._steps = list(snapshot.steps)
+        self._steps[:] = snapshot.steps
         self._ended = np.array(snapshot.ended)
 
     def twin(self) -> Self:
@@ -227,15 +205,14 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         twin.envs = tuple(env.twin() for env in self.envs)
         for name in self.SPACES:
             setattr(twin, name, copy.deepcopy(getattr(self, name)))
-        twin._looks = twin._rows_of(twin.envs)
-        twin._steps, twin._ended = [0] * self.num_envs, np.zeros(self.num_envs, bool)
-        twin._pool = None
+        twin._crew = Crew(self.threads)
+        twin._prepare()
         return twin
 
     def observe(self) -> Observation:
         """The present observation once more: after `restore`, for instance. Changes nothing."""
         rows = self._looks.fresh()
-        self._each(range(self.num_envs), lambda index: self._looks.look(rows, index))
+        self._crew.each([partial(self._looks.look, rows, i) for i in range(self.num_envs)])
         self._looks.add_prompts(rows)
         return self._form.of(rows)
 
@@ -254,138 +231,68 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
 
     def close_extras(self, **_options: Any) -> None:
         """Stops the threads and closes the environments."""
-        if self._pool is not None and self._pool_of == os.getpid():
-            self._pool.shutdown()
+        self._crew.close()
         for env in self.envs:
             env.close()
 
     @property
+    def threads(self) -> int:
+        """How many threads step the worlds."""
+        return self._crew.threads
+
+    @property
     def _form(self) -> Form:
         """In which observations are shown."""
-        return self.envs[0].form
+        return self.envs[0].course.form
 
-    @staticmethod
-    def _rows_of(envs: Sequence[RouteEnv]) -> WorldRows:
-        """What the worlds see, as it is, whatever the form."""
-        return WorldRows(envs[0].seen_space, [env.observer for env in envs])
+    def _prepare(self) -> None:
+        """Makes what belongs to these environments alone: none of them has begun."""
+        space = self.envs[0].course.seen_space()
+        self._looks = WorldRows(space, [env.observer for env in self.envs])
+        self._worlds = Worlds(self.envs)
+        self._steps = np.zeros(self.num_envs, np.int64)
+        self._ended = np.zeros(self.num_envs, bool)
 
-    def _begin(
-        self, index: int, seed: int | None, options: Mapping[str, Any], rows: Observation
-    ) -> Info:
-        """Resets a world; its observation goes to its row."""
-        self._steps[index] = 0
-        self._ended[index] = False
-        observation, info = self.envs[index].begin(seed=seed, options=options)
-        self._looks.write(rows, index, observation)
-        return info
+    def _beginnings(
+        self,
+        indices: NDArray[np.intp],
+        rows: Observation,
+        begun: dict[int, Info],
+        seeds: Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> list[Callable[[], None]]:
+        """The jobs of resetting some worlds, whose observations go to their rows."""
 
-    def _outcome(
-        self, index: int, before: Standing, events: Sequence[Event]
-    ) -> tuple[float, bool, bool, Info]:
-        reward, terminated, truncated, info = self.envs[index].outcome(before, events)
-        self._steps[index] += 1
-        truncated = truncated or (self._limit is not None and self._steps[index] >= self._limit)
-        return reward, terminated, truncated, info
+        def begin(index: int) -> None:
+            self._steps[index] = 0
+            self._ended[index] = False
+            seed = None if seeds is None else seeds[index]
+            observation, begun[index] = self.envs[index].begin(seed=seed, options=options)
+            self._looks.write(rows, index, observation)
+
+        return [partial(begin, index) for index in indices.tolist()]
+
+    def _advance(self, begin: int, end: int, left: NDArray[np.bool_], rows: Observation) -> None:
+        """Steps the worlds [begin, end) but those that are left, and looks at them."""
+        self._worlds.run(begin, end)
+        if self._looks.with_sensors:
+            for index in range(begin, end):
+                if not left[index]:
+                    self._looks.measure(rows, index)
 
     def _restarts(self) -> bool:
         """Whether a step that ends an episode begins the next one, and some have ended."""
         return self.autoreset_mode == AutoresetMode.SAME_STEP and bool(self._ended.any())
 
-    def _restart(self, rows: Observation, infos: list[Info]) -> Info:
+    def _restart(self, rows: Observation, infos: Infos, begun: dict[int, Info]) -> Info:
         """Resets the worlds that have ended; returns what they ended with, as Gymnasium has it."""
-        ended = np.flatnonzero(self._ended).tolist()
         batched: Info = {}
-        for index in ended:
+        for index in np.flatnonzero(self._ended).tolist():
             last = self._form.of(self._looks.row(rows, index))
-            final = {"final_obs": last, "final_info": infos[index]}
+            final = {"final_obs": last, "final_info": infos.row(index)}
             batched = self._add_info(batched, final, index)
         flags = self._ended.copy()
-
-        def begin(index: int) -> None:
-            infos[index] = self._begin(index, None, {}, rows)
-
-        self._each(ended, begin)
+        self._crew.each(self._beginnings(np.flatnonzero(flags), rows, begun))
         self._looks.add_prompts(rows)
         self._ended = flags
         return batched
-
-    def _each(self, indices: Iterable[int], work: Callable[[int], None]) -> None:
-        """Does the work for each index, the threads taking the next one as they become free."""
-        todo = iter(indices)  # next() on it holds the lock of the interpreter: nobody gets it twice
-
-        def labour() -> None:
-            for index in todo:
-                work(index)
-
-        pool = self._threads()
-        helpers = [] if pool is None else [pool.submit(labour) for _ in range(self.threads - 1)]
-        try:
-            labour()
-        finally:
-            errors = [helper.exception() for helper in helpers]
-        for error in filter(None, errors):
-            raise error
-
-    def _threads(self) -> ThreadPoolExecutor | None:
-        """The threads beside the calling one; made anew in a process that was forked.
-
-        A fork takes no threads along, and whoever waits for one there waits for ever.
-        """
-        if self.closed:
-            raise ClosedEnvironmentError("The environment is closed: make another one.")
-        if self.threads > 1 and (self._pool is None or self._pool_of != os.getpid()):
-            self._pool = ThreadPoolExecutor(self.threads - 1, "worlds")
-            self._pool_of = os.getpid()
-        return self._pool
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + index for index in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"There are {self.num_envs} worlds, so as many seeds; got {seed!r}.")
-        return seed
-
-    def _mask(self, mask: Any) -> NDArray[np.bool_]:
-        if mask is None:
-            return np.ones(self.num_envs, bool)
-        mask = np.asarray(mask)
-        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
-            raise ValueError(
-                f"options['reset_mask'] has a bool for each of the {self.num_envs} worlds, one or "
-                f"more of them true; got {mask!r}."
-            )
-        return mask
-
-    def _checked(self, actions: Any, resets: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The actions of those that will be stepped, all checked before the first one moves."""
-        rows = np.asarray(actions)
-        if rows.shape != (self.num_envs, 3):
-            raise ValueError(
-                f"Actions have shape ({self.num_envs}, 3): throttle, steer, brake of each world; "
-                f"got shape {rows.shape}."
-            )
-        rows = np.where(resets[:, None], 0.0, rows)
-        controls = rows.astype(np.float64)
-        if not ((controls >= LOW) & (controls <= HIGH)).all():
-            for row in rows:
-                checked_action(row)  # one of them raises, and says which entry is wrong
-        return controls
-
-    def _infos(self, infos: Sequence[Info], chosen: Iterable[int]) -> Info:
-        """`info` as Gymnasium batches it: arrays, each with a mask of who has the entry."""
-        indices = list(chosen)
-        if len(indices) == self.num_envs:
-            return batched_infos(infos)
-        batched: Info = {}
-        for index in indices:
-            batched = self._add_info(batched, infos[index], index)
-        return batched
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -11,26 +11,25 @@ import hashlib
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rich.console import Console
 
-SENSORS = ("prompt", "inertial", "odometry", "camera", "lidar")
 TOP = Path(__file__).resolve().parent.parent
 REMEMBERED = "driveinsight/kernels"  # a key of pytest's cache
-STEPS = 3
 
 
 def compile_kernels(config: pytest.Config) -> None:
     """Compiles what the sources as they are ask for, with a line and a bar if there is much."""
     from di_envs.numerics.kernels import kernel_cache
     from leaderboard.running.compiling import compile_progress
+    from leaderboard.running.warming import WORKS
 
     digest, cache = sources(), getattr(config, "cache", None)  # none with -p no:cacheprovider
     if cache and kernel_cache().is_dir() and cache.get(REMEMBERED, "") == digest:
         return
     with shown(config), compile_progress(Console()):
-        drive_a_little()
+        for work in WORKS.values():
+            work()
     if cache:
         cache.set(REMEMBERED, digest)
 
@@ -49,18 +48,3 @@ def shown(config: pytest.Config) -> AbstractContextManager[None]:
     """Lets through to the terminal what pytest keeps to itself."""
     capture = config.pluginmanager.getplugin("capturemanager")
     return capture.global_and_fixture_disabled() if capture else nullcontext()
-
-
-def drive_a_little() -> None:
-    """The expert decides once, then the brake is held: these steps run nearly every kernel."""
-    from agents import load_agent
-    from di_envs.route_env import RouteEnv
-    from leaderboard.running.bound import light_limited_bound
-
-    env = RouteEnv(suite="toy", observations=SENSORS, traffic=4, walkers=4)
-    observation, _ = env.reset(seed=0)
-    expert = load_agent("expert")
-    expert.act({**observation, "world": env.view}, expert.start(env.plan, 0))
-    for _ in range(STEPS):
-        env.step(np.array([0.0, 0.0, 1.0], np.float32))
-    light_limited_bound(env.view.town, env.plan, 0)

@@ -25,7 +25,7 @@ FLOORS = {
         {"town"},
         {"world"},
         {"rules", "sensors", "actions", "highway"},
-        {"", "drawing", "edits"},
+        {"", "drawing", "edits", "bulk"},
     ),
     "agents": (
         {""},

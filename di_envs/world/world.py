@@ -114,6 +114,16 @@ class World:
             raise RuntimeError("the world holds no episode yet; call reset(seed, plans) first")
         return self._view
 
+    @property
+    def moving_parts(self) -> tuple[State, Scenery]:
+        """The state, to be changed by kernels, and what it stands on. Others after a reset.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        self.view  # noqa: B018 (raises before the first reset)
+        return self._state, self._scenery
+
     def reset(self, seed: int, plans: Sequence[RoutePlan]) -> None:
         """Starts an episode: egos at their routes' starts, traffic and walkers drawn from `seed`.
 
@@ -151,7 +161,7 @@ class World:
                 batch, self._event_rows,
             )  # fmt: skip
             if rows:
-                events += [_event(row) for row in self._event_rows[:rows]]
+                events += [event_of_row(row) for row in self._event_rows[:rows]]
             ticks -= batch
         return events
 
@@ -266,7 +276,8 @@ class World:
         self._view = WorldView(town=self.town, state=read_only, plans=plans, capacity=capacity)
 
 
-def _event(row: NDArray[np.float64]) -> Event:
+def event_of_row(row: NDArray[np.float64]) -> Event:
+    """What a row says, (COLUMNS,), as kernels report events."""
     kind, ego, tick, x, y, z, other, value = row.tolist()
     return Event(
         kind=EventKind(int(kind)),

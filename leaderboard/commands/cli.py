@@ -45,6 +45,7 @@ from leaderboard.commands.score import SCORE_HELP, ScoreByRules
 from leaderboard.commands.show import SHOW_HELP, Show
 from leaderboard.commands.train import TRAIN_HELP, Train
 from leaderboard.commands.verify import VERIFY_HELP, Verify
+from leaderboard.commands.warm_up import WARM_UP_HELP, WarmUp
 from leaderboard.commands.watch import WATCH_HELP, Watch
 
 HELP = """Drive agents in closed loop and score them as the CARLA Leaderboard does.
@@ -61,6 +62,7 @@ First steps:
   driveinsight watch results/expert-town05_tiny           a drive once more, in a window
   driveinsight play --suite town05_tiny                   drive yourself, and be scored
   driveinsight collect                                    data to train a policy of your own
+  driveinsight warm-up                                    compile now what first runs wait for
   driveinsight doctor                                     is all there? what to do if not"""
 
 Command = (
@@ -84,6 +86,7 @@ Command = (
     | Annotated[ExportAgent, tyro.conf.subcommand("export-agent", description=EXPORT_AGENT_HELP)]
     | Annotated[Agents, tyro.conf.subcommand("agents")]
     | Annotated[Suites, tyro.conf.subcommand("suites")]
+    | Annotated[WarmUp, tyro.conf.subcommand("warm-up", description=WARM_UP_HELP)]
     | Annotated[Doctor, tyro.conf.subcommand("doctor", description=DOCTOR_HELP)]
 )
 

@@ -81,6 +81,48 @@ def test_sensors_in_threads_see_what_those_of_single_environments_see():
     theirs.close()
 
 
+def test_worlds_of_other_numbers_of_actors_take_turns_in_one_working_memory():
+    """Routes of a town with scenarios differ in whom they need; what one leaves, another finds."""
+    options = {"suite": "town05_short", "observations": ("prompt",), "traffic": 20, "walkers": 10}
+    ours = RouteVectorEnv(N, threads=1, **options)
+    singles = [ours.envs[0].twin() for _ in range(N)]
+    ours.reset(seed=7)
+    for index, single in enumerate(singles):
+        single.reset(seed=7 + index)
+    assert len({single.view.capacity for single in singles}) > 1
+    for _ in range(20):
+        ours.step(ACTIONS)
+        for index, single in enumerate(singles):
+            single.step(ACTIONS[index])
+    for one, single in zip(ours.envs, singles, strict=True):
+        assert one.world.save().record.tobytes() == single.world.save().record.tobytes()
+        assert data_equivalence(one.observe(), single.observe(), exact=True)
+
+
+def test_what_costs_counts_in_its_world_also_in_one_that_is_put_there():
+    """The first runs a red light, the second is put to where the first one then is."""
+    options = {"suite": "toy", "traffic": 0, "walkers": 0, "observations": ("prompt",)}
+    ours = RouteVectorEnv(2, threads=1, autoreset_mode="Disabled", **options)
+    single = ours.envs[0].twin()
+    ours.reset(seed=3)
+    single.reset(seed=3)
+    penalties = []
+    for step in range(40):
+        if step == 36:
+            ours.envs[1].restore_state(single.save_state())
+        _, rewards, _, _, infos = ours.step(ACTIONS[[0, 0]])
+        _, reward, _, _, info = single.step(ACTIONS[0])
+        for world in range(1 if step < 36 else 2):
+            assert rewards[world] == reward
+            for term, value in info["reward_terms"].items():
+                assert infos["reward_terms"][term][world] == value
+            for name in ("infraction_penalty", "driving_score", "events"):
+                assert infos[name][world] == info[name]
+        penalties.append(info["infraction_penalty"])
+    assert penalties[0] == 1.0
+    assert penalties[35] == 0.7
+
+
 def test_without_autoreset_the_caller_resets_those_of_a_mask():
     ours, theirs = make_pair(AutoresetMode.DISABLED, 2, observations=GROUPS)
     ours.reset(seed=[5, 6, 7])

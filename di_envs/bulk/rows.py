@@ -49,9 +49,17 @@ class WorldRows:
 
     def look(self, rows: Rows, index: int) -> None:
         """Has a world's prompt written to its buffer, and what sensors see to its rows."""
-        observer = self._observers[index]
-        observer.write_tables()
-        self.write(rows, index, observer.measure())
+        self._observers[index].write_tables()
+        self.measure(rows, index)
+
+    @property
+    def with_sensors(self) -> bool:
+        """Whether there is more to see than prompts."""
+        return bool(self._sensors.spaces)
+
+    def measure(self, rows: Rows, index: int) -> None:
+        """Writes what a world's sensors see to its rows; its tables are written already."""
+        self.write(rows, index, self._observers[index].measure())
 
     def write(self, rows: Rows, index: int, observation: Rows) -> None:
         """Copies what a world's sensors have seen to its rows."""
@@ -72,18 +80,3 @@ class WorldRows:
 def _own(row: Any) -> Any:
     """A row that later writing leaves as it is."""
     return row.copy() if isinstance(row, np.ndarray) else row
-
-
-def batched_infos(infos: Sequence[Rows]) -> Rows:
-    """What `VectorEnv._add_info` makes of infos that all have the same keys, in less time."""
-    batched: Rows = {}
-    for key, first in infos[0].items():
-        values = [info[key] for info in infos]
-        if isinstance(first, dict):
-            batched[key] = batched_infos(values)
-        elif type(first) in (int, float, bool):
-            batched[key] = np.array(values, type(first))
-        else:
-            batched[key] = np.fromiter(values, object, len(values))
-        batched[f"_{key}"] = np.ones(len(infos), bool)
-    return batched

@@ -1,0 +1,1 @@
+"""Many worlds at once: what a vector environment does for all of them together."""
