@@ -195,6 +195,7 @@ def _scenario_table(run: RunRecord) -> Table:
 
 def _caption(run: RunRecord) -> str:
     routes = len({record.route_id for record in run.scored})
+    routes_of = f"{routes} route{'s' if routes > 1 else ''} of {run.town}"
     driven_km = math.fsum(record.done_m for record in run.scored) / 1000.0
     seeds = len({record.seed for record in run.scored})
     if seeds == 1:
@@ -202,7 +203,7 @@ def _caption(run: RunRecord) -> str:
     else:
         doubt = f"± is the 95 % t-interval of the means of {seeds} seeds"
     lines = [
-        f"{routes} routes of {run.town}, {driven_km:.1f} km driven; {doubt}.",
+        f"{routes_of}, {driven_km:.1f} km driven; {doubt}.",
         "bound: DS of a perfect driver on empty roads with the same lights, under the timeout.",
         *claim_lines(run),
     ]
