@@ -124,6 +124,8 @@ def test_gradients_reach_every_parameter(name):
     assert without == []
     # what is never given moves no encoder that is its alone
     never = tuple(f"prompt.{name}." for name in COMPONENTS if name not in policy.config.prompt)
+    if "traffic_lights" not in policy.config.prompt:  # eyes that learnt nothing come to no signal
+        never += ("prompt.signals.encode.next.",)
     still = [n for n, v in policy.named_parameters() if not v.grad.abs().sum() > 0.0]
     assert [n for n in still if not n.startswith(never)] == []
 
@@ -204,7 +206,8 @@ def test_taps_are_named_by_their_place_and_can_be_edited(small):
     assert not torch.equal(plain, edited)
     assert torch.equal(plain, after)
     weights = seen["planner.layers.0.attention.weights"][0]
-    assert weights.shape == (1, 6, 1, 9 + 3)
+    # nine components, and one more for what comes next in three; five of what is seen
+    assert weights.shape == (1, 6, 1, 9 + 3 + 5)
     assert torch.allclose(weights.sum(dim=-1), torch.ones(1, 6, 1))
 
 

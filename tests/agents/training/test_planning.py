@@ -58,7 +58,7 @@ def test_what_is_encoded_and_set_aside_is_what_would_be_observed_there(cache, mo
     moment = int(cache.moments.moment[row])
     stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
     there, state = observer.observe(), stage.view.state
-    samples = samples_of(cache, held_out=0.0)
+    samples = samples_of(cache, held_out=0.0, mistold=0.0, turned_red=0.0, among_others=0.0)
     monkeypatch.setattr(
         "agents.training.planning.set_aside",
         lambda *_: (np.full(4, right_m), np.full(4, turn_rad)),

@@ -83,7 +83,7 @@ def test_comments_and_a_renamed_module_leave_the_footing_as_it_was(here, tree):
         path = tree / file
         path.write_text(path.read_text() + "\n# one more comment\n")
     (tree / "agents" / "constant.py").rename(tree / "agents" / "steady.py")
-    table = tree / "agents" / "__init__.py"
+    table = tree / "agents" / "table.py"
     table.write_text(table.read_text().replace("agents.constant:", "agents.steady:"))
     card = tree / "agents/driveinsight/weights/driveinsight/README.md"
     card.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +95,7 @@ def test_weights_and_a_declared_version_are_another_footing(here, tree):
     weights = tree / "agents/driveinsight/weights/driveinsight/weights.safetensors"
     weights.parent.mkdir(parents=True, exist_ok=True)
     weights.write_bytes(b"other weights")
-    table = tree / "agents" / "__init__.py"
+    table = tree / "agents" / "table.py"
     now, new = AGENTS["expert"].version, AGENTS["expert"].version + 1  # the first in the table
     table.write_text(table.read_text().replace(f"version={now},", f"version={new},", 1))
     world = tree / "di_envs" / "world_version.py"
