@@ -32,7 +32,7 @@ from di_envs.vector_env import RouteVectorEnv
 
 GROUPS = {"prompt": ("prompt",), "camera, lidar, prompt": ("camera", "lidar", "prompt")}
 ONE = "one environment"
-ROUND_STEPS = {"prompt": 1920, "camera, lidar, prompt": 128}  # of all worlds together
+ROUND_STEPS = {"prompt": 1536, "camera, lidar, prompt": 128}  # of all worlds together
 CONTROL = np.array([0.0, 0.0, 1.0], np.float32)  # stands, so that no world ends
 
 

@@ -9,12 +9,12 @@ before the step, then each kind of infraction.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from di_envs.numerics.arrays import Float64, Int32
 from di_envs.rules.penalties import Penalties
 from di_envs.world.event_names import EVENT_KEYS
-from di_envs.world.state import EventKind, State
+from di_envs.world.state import EventKind
 
 
 class Standing(NamedTuple):
@@ -26,34 +26,38 @@ class Standing(NamedTuple):
     pace_shares: tuple[float, ...] = ()  # at checkpoints, of the traffic's mean speed, 0..1
 
 
-def standing_of(state: State, ego: int) -> Standing:
+class Marks(Protocol):
+    """What a standing is read off: a state, or what was noted of many, with an axis E of egos."""
+
+    @property
+    def route_done_m(self) -> Float64:
+        """(E,) metres of the dense route completed."""
+
+    @property
+    def outside_m(self) -> Float64:
+        """(E,) route metres outside lanes or against them."""
+
+    @property
+    def outside_done_m(self) -> Float64:
+        """(E,) route metres over which they were counted."""
+
+    @property
+    def counts(self) -> Int32:
+        """(E, EVENT_KINDS) events so far."""
+
+    @property
+    def pace_share(self) -> Float64:
+        """(E, CHECKPOINTS) ego's share of the traffic's pace."""
+
+
+def standing_of(state: Marks, ego: int) -> Standing:
     """An ego's standing in the present state."""
-    return standing_from(
-        float(state.route_done_m[ego]),
-        float(state.outside_m[ego]),
-        float(state.outside_done_m[ego]),
-        state.counts[ego],
-        state.pace_share[ego],
-    )
-
-
-def standing_from(
-    done_m: float, outside_m: float, counted_m: float, counts: Int32, pace_share: Float64
-) -> Standing:
-    """A standing out of what a state holds of an ego.
-
-    Args:
-        done_m: Metres of the dense route completed.
-        outside_m: Of them outside the lanes or against them …
-        counted_m: … over which those were counted: over route points of their own, as CARLA does,
-            which are nearly, not exactly, the metres done.
-        counts: (EVENT_KINDS,) events so far.
-        pace_share: (CHECKPOINTS,) of the traffic's mean speed.
-    """
-    share = min(outside_m / counted_m, 1.0) if outside_m > 0.0 else 0.0
-    events = tuple(counts.tolist())
-    pace_shares = tuple(pace_share.tolist()) if events[EventKind.MIN_SPEED] else ()
-    return Standing(done_m, share, events, pace_shares)
+    outside_m = float(state.outside_m[ego])
+    # Counted over route points of its own, as CARLA does: nearly, not exactly, the metres done.
+    share = min(outside_m / float(state.outside_done_m[ego]), 1.0) if outside_m > 0.0 else 0.0
+    counts = tuple(state.counts[ego].tolist())
+    pace_shares = tuple(state.pace_share[ego].tolist()) if counts[EventKind.MIN_SPEED] else ()
+    return Standing(float(state.route_done_m[ego]), share, counts, pace_shares)
 
 
 def inside_metres(standing: Standing) -> float:

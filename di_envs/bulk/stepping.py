@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from di_envs.bulk.fetching import fetch_traffic, fetch_walkers
 from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.numerics.bundle_rows import BundleRow
 from di_envs.numerics.bundles import by_reference
@@ -22,7 +23,6 @@ from di_envs.world.step import Scenery, Scratch
 
 # Rows of `Tally.numbers`, then one a term of the reward behind the first two of them
 COMPLETION, PENALTY, SCORE, TIME, JUNCTION, PROGRESS, OUTSIDE = range(7)
-DONE, OUTSIDE_M, OUTSIDE_DONE = range(3)  # columns of `Tally.metres`
 
 _EGO = 0
 
@@ -42,6 +42,17 @@ class WorldParts(NamedTuple):
 
 
 @by_reference
+class Before(NamedTuple):
+    """Where the egos of N worlds stood before a step: named as in `State`, for `standing_of`."""
+
+    route_done_m: Float64  # (N,)
+    outside_m: Float64  # (N,)
+    outside_done_m: Float64  # (N,)
+    counts: Int32  # (N, EVENT_KINDS)
+    pace_share: Float64  # (N, CHECKPOINTS)
+
+
+@by_reference
 class Tally(NamedTuple):
     """What the kernel is told of N worlds, and what it says of their steps."""
 
@@ -51,11 +62,7 @@ class Tally(NamedTuple):
     counts: Int32  # (N, EVENT_KINDS) events
     pace: Float64  # (N, CHECKPOINTS) shares of the traffic's pace
     penalty: Float64  # (N,) the infraction score
-    # written: where the worlds stood before the step
-    metres_before: Float64  # (N, 3) done, outside lanes, over which those were counted
-    counts_before: Int32  # (N, EVENT_KINDS)
-    pace_before: Float64  # (N, CHECKPOINTS)
-    # written: what came of it
+    before: Before  # written, as is the rest: what came of the step
     events: Int32  # (N,) rows in use
     counted: Int8  # (N,) 1 where the rules may have counted something: Python works it out
     reward: Float64  # (N,)
@@ -70,9 +77,13 @@ def make_tally(worlds: int, terms: int) -> Tally:
         counts=np.full((worlds, EVENT_KINDS), -1, np.int32),
         pace=np.zeros((worlds, CHECKPOINTS)),
         penalty=np.zeros(worlds),
-        metres_before=np.zeros((worlds, 3)),
-        counts_before=np.zeros((worlds, EVENT_KINDS), np.int32),
-        pace_before=np.zeros((worlds, CHECKPOINTS)),
+        before=Before(
+            route_done_m=np.zeros(worlds),
+            outside_m=np.zeros(worlds),
+            outside_done_m=np.zeros(worlds),
+            counts=np.zeros((worlds, EVENT_KINDS), np.int32),
+            pace_share=np.zeros((worlds, CHECKPOINTS)),
+        ),
         events=np.zeros(worlds, np.int32),
         counted=np.zeros(worlds, np.int8),
         reward=np.zeros(worlds),
@@ -112,7 +123,9 @@ def step_worlds(
             continue
         world = worlds[index]
         state = world.state
-        _note_before(tally, state, index)
+        if index + 1 < end:
+            _fetch(worlds[index + 1])
+        _note_before(tally.before, state, index)
         state.throttle[_EGO] = tally.controls[index, 0]
         state.steer[_EGO] = tally.controls[index, 1]
         state.brake[_EGO] = tally.controls[index, 2]
@@ -131,13 +144,21 @@ def step_worlds(
 
 
 @kernel
-def _note_before(tally: Tally, state: State, index: int) -> None:
+def _fetch(world: WorldParts) -> None:
+    """Asks for what the world that comes next will read."""
+    state, scenery = world.state, world.scenery
+    fetch_traffic(state, scenery.lanes, scenery.tables, world.vehicle_end)
+    fetch_walkers(state, scenery.walk, world.vehicle_end, world.walker_end)
+
+
+@kernel
+def _note_before(before: Before, state: State, index: int) -> None:
     """Notes where a world's ego stands."""
-    tally.metres_before[index, DONE] = state.route_done_m[_EGO]
-    tally.metres_before[index, OUTSIDE_M] = state.outside_m[_EGO]
-    tally.metres_before[index, OUTSIDE_DONE] = state.outside_done_m[_EGO]
-    tally.counts_before[index] = state.counts[_EGO]
-    tally.pace_before[index] = state.pace_share[_EGO]
+    before.route_done_m[index] = state.route_done_m[_EGO]
+    before.outside_m[index] = state.outside_m[_EGO]
+    before.outside_done_m[index] = state.outside_done_m[_EGO]
+    before.counts[index] = state.counts[_EGO]
+    before.pace_share[index] = state.pace_share[_EGO]
 
 
 @kernel
@@ -148,10 +169,13 @@ def _count(tally: Tally, world: WorldParts, index: int) -> None:
     if tally.counted[index]:
         return
     done_m, penalty = state.route_done_m[_EGO], tally.penalty[index]
-    before = tally.metres_before[index]
+    before = tally.before
+    done_before = before.route_done_m[index]
     inside_m = _inside_metres(done_m, state.outside_m[_EGO], state.outside_done_m[_EGO])
-    inside_before = _inside_metres(before[DONE], before[OUTSIDE_M], before[OUTSIDE_DONE])
-    progress_m = done_m - before[DONE]
+    inside_before = _inside_metres(
+        done_before, before.outside_m[index], before.outside_done_m[index]
+    )
+    progress_m = done_m - done_before
     numbers = tally.numbers
     numbers[COMPLETION, index] = 100.0 * done_m / world.length_m
     numbers[PENALTY, index] = penalty
@@ -171,11 +195,11 @@ def _all_is_known(tally: Tally, state: State, index: int) -> bool:
         return False
     for kind in range(EVENT_KINDS):
         known = tally.counts[index, kind]
-        if tally.counts_before[index, kind] != known or state.counts[_EGO, kind] != known:
+        if tally.before.counts[index, kind] != known or state.counts[_EGO, kind] != known:
             return False
     for at in range(CHECKPOINTS):
         share = tally.pace[index, at]
-        if tally.pace_before[index, at] != share or state.pace_share[_EGO, at] != share:
+        if tally.before.pace_share[index, at] != share or state.pace_share[_EGO, at] != share:
             return False
     return True
 

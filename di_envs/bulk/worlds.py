@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 
 from di_envs.bulk.infos import Infos
 from di_envs.bulk.stepping import (
-    DONE,
-    OUTSIDE_DONE,
-    OUTSIDE_M,
     Tally,
     WorldParts,
     make_tally,
@@ -23,7 +20,7 @@ from di_envs.numerics.bundle_rows import BundleRow
 from di_envs.numerics.kernels import bind
 from di_envs.numerics.machine_code import MachineCode
 from di_envs.observer import ObservationParts, fill_observation
-from di_envs.reward import standing_from, term_names
+from di_envs.reward import standing_of, term_names
 from di_envs.route_env import RouteEnv
 from di_envs.world.building import capacity_for, make_scratch
 from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
@@ -182,14 +179,7 @@ class Worlds:
     def _counted(self, index: int) -> tuple[float, bool, bool, dict[str, Any]]:
         """A world's step in which the rules may have counted something, as a single one has it."""
         env, tally = self._envs[index], self._tally
-        metres = tally.metres_before[index]
-        before = standing_from(
-            float(metres[DONE]),
-            float(metres[OUTSIDE_M]),
-            float(metres[OUTSIDE_DONE]),
-            tally.counts_before[index],
-            tally.pace_before[index],
-        )
+        before = standing_of(tally.before, index)
         assert self._row is not None
         rows = self._row[index].event_rows[: tally.events[index]]
         outcome = env.outcome(before, [event_of_row(row) for row in rows])

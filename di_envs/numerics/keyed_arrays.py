@@ -53,6 +53,13 @@ def keyed_uniforms(
     return uniforms.reshape(*uniforms.shape[:-1], *shape)
 
 
+def keyed_hashes(seed: int, stream: int, tick: int, count: int) -> NDArray[np.uint64]:
+    """(count,) `keyed_random.keyed_hash` of the actors from 0 on."""
+    part = _mixed(_column(seed))
+    part = _mixed(part ^ np.uint64(stream))
+    return _mixed(_mixed(part ^ _column(tick)) ^ np.arange(count, dtype=np.uint64))
+
+
 def keyed_normals(
     seed: Keys, stream: int, tick: Keys, shape: tuple[int, ...], first: Keys = 0
 ) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from di_envs.world.state import OCCUPIED_LANES, ActorKind, Capacity, Routes, Sta
 from di_envs.world.step import Scenery, Scratch
 from di_envs.world.traffic.approach import make_requests
 from di_envs.world.traffic.occupancy import make_occupancy
-from di_envs.world.traffic.spawn import spawn_traffic
+from di_envs.world.traffic.spawn import Spots, find_spots, spawn_traffic
 from di_envs.world.traffic.speed_choice import make_leaders
 from di_envs.world.traffic.tables import TrafficTables, traffic_tables
 from di_envs.world.walkers.neighbours import make_neighbours
@@ -41,13 +41,16 @@ class TownTables:
 
     traffic: TrafficTables
     walk: WalkGraph
+    spots: Spots
     ego_model: EgoParameters
 
 
 def town_tables(town: Town) -> TownTables:
     """Computes the tables of a town."""
+    traffic = traffic_tables(town)
     return TownTables(
-        traffic=traffic_tables(town),
+        traffic=traffic,
+        spots=find_spots(town.lanes, traffic),
         walk=build_walk_graph(town),
         ego_model=EgoModel().parameters(),
     )
@@ -118,7 +121,12 @@ def route_arrays(plans: Sequence[RoutePlan]) -> Routes:
 
 
 def begin_episode(
-    state: State, seed: int, scenery: Scenery, capacity: Capacity, plans: tuple[RoutePlan, ...]
+    state: State,
+    seed: int,
+    scenery: Scenery,
+    spots: Spots,
+    capacity: Capacity,
+    plans: tuple[RoutePlan, ...],
 ) -> None:
     """Fills a fresh state: lights, egos at their routes' starts, traffic and walkers, poles.
 
@@ -126,6 +134,7 @@ def begin_episode(
         state: All zeros; filled.
         seed: Of all draws.
         scenery: What the world stands on.
+        spots: Where vehicles may stand at first.
         capacity: How many there are of each.
         plans: One an ego.
     """
@@ -136,7 +145,7 @@ def begin_episode(
     start_lights(state, signals)
     for ego, plan in enumerate(plans):
         _place_ego(state, lanes, ego, plan)
-    spawn_traffic(state, lanes, scenery.tables, plans, capacity.egos, capacity.vehicles)
+    spawn_traffic(state, lanes, scenery.tables, spots, plans, capacity.egos, capacity.vehicles)
     spawn_walkers(state, scenery.walk, capacity.vehicle_end, capacity.walkers)
     place_poles(state, signals, capacity.walker_end)
 

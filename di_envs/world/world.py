@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +133,8 @@ class World:
             plans: One route an ego; none for a world of traffic alone.
         """
         self._allocate(tuple(plans))
-        begin_episode(self._state, seed, self._scenery, self.view.capacity, self.view.plans)
+        view, spots = self.view, self._tables.spots
+        begin_episode(self._state, seed, self._scenery, spots, view.capacity, view.plans)
 
     def advance(self, controls: NDArray[np.float64], ticks: int = 1) -> list[Event]:
         """Holds the egos' controls for some ticks and returns what happened.
@@ -154,6 +156,8 @@ class World:
     def run(self, ticks: int) -> list[Event]:
         """Lets time pass and returns what happened. Nearly all of it without Python's lock."""
         events: list[Event] = []
+        if self._advance is None:
+            self._bind()
         while ticks > 0:
             batch = min(ticks, BATCH_TICKS)
             rows = self._advance(
@@ -258,6 +262,15 @@ class World:
         self._state = views_of(self._record)
         self._vehicle_end, self._walker_end = capacity.vehicle_end, capacity.walker_end
         self._scenery = build_scenery(self.town, self._tables, plans, scenarios)
+        self._advance: Any = None
+        read_only = views_of(self._record)
+        for array in read_only:
+            array.flags.writeable = False
+        self._view = WorldView(town=self.town, state=read_only, plans=plans, capacity=capacity)
+
+    def _bind(self) -> None:
+        """Makes what only `run` needs: worlds that a vector environment steps have none of it."""
+        capacity = self.view.capacity
         self._scratch = make_scratch(self.town, capacity)
         self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * BATCH_TICKS, COLUMNS))
         self._advance = bind(
@@ -270,10 +283,6 @@ class World:
             BATCH_TICKS,
             self._event_rows,
         )
-        read_only = views_of(self._record)
-        for array in read_only:
-            array.flags.writeable = False
-        self._view = WorldView(town=self.town, state=read_only, plans=plans, capacity=capacity)
 
 
 def event_of_row(row: NDArray[np.float64]) -> Event:

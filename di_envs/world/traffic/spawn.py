@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
+from di_envs.numerics.keyed_arrays import keyed_hashes
+from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.town.lanes import Lanes
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import ActorKind, State
@@ -86,10 +88,37 @@ VEHICLES = (
 )
 
 
+class Spots(NamedTuple):
+    """Places of a town, K of them, where vehicles may stand at first."""
+
+    lane: NDArray[np.int32]  # (K,)
+    station_m: NDArray[np.float64]  # (K,)
+    place: NDArray[np.float64]  # (K, 3) x, y, z
+
+
+def find_spots(lanes: Lanes, tables: TrafficTables) -> Spots:
+    """Places on lanes outside junctions, a vehicle's length and a gap apart.
+
+    None where a lane only begins: there it lies over the lane beside it.
+    """
+    lane_of, station_m, point = [np.zeros(0, np.int32)], [np.zeros(0)], [np.zeros(0, np.int32)]
+    for lane in np.flatnonzero((tables.usable == 1) & (lanes.junction < 0)):
+        stations = np.arange(END_MARGIN_M, lanes.length_m[lane] - END_MARGIN_M, SPOT_SPACING_M)
+        full = FULL_SHARE * lanes.width_m[lanes.first[lane] :][: lanes.count[lane]].max()
+        points = lanes.first[lane] + (stations / lanes.spacing_m[lane]).astype(np.int32)
+        wide = lanes.width_m[points] >= full
+        lane_of.append(np.full(wide.sum(), lane, np.int32))
+        station_m.append(stations[wide])
+        point.append(points[wide])
+    place = np.ascontiguousarray(lanes.points[np.concatenate(point), :3])
+    return Spots(np.concatenate(lane_of), np.concatenate(station_m), place)
+
+
 def spawn_traffic(
     state: State,
     lanes: Lanes,
     tables: TrafficTables,
+    spots: Spots,
     plans: tuple[RoutePlan, ...],
     first: int,
     count: int,
@@ -99,53 +128,32 @@ def spawn_traffic(
     Where the town has fewer free places, as many drive as fit, and a warning says so.
     """
     seed = int(state.seed[()])
-    spots = _spots(lanes, tables, plans, seed)
-    if len(spots) < count:
+    chosen = _chosen(spots, plans, seed)
+    if len(chosen) < count:
         warnings.warn(
-            f"expected room for {count} vehicles, but the town has {len(spots)} free places: "
-            f"{len(spots)} drive; ask for no more to hear nothing of it",
+            f"expected room for {count} vehicles, but the town has {len(chosen)} free places: "
+            f"{len(chosen)} drive; ask for no more to hear nothing of it",
             stacklevel=2,
         )
-    for actor, (lane, station) in enumerate(spots[:count], first):
+    for actor, spot in enumerate(chosen[:count].tolist(), first):
         _equip(state, actor, seed)
-        state.lane[actor] = lane
-        state.lane_m[actor] = station
-        state.path[actor, 0] = lane
+        state.lane[actor] = state.path[actor, 0] = spots.lane[spot]
+        state.lane_m[actor] = spots.station_m[spot]
         choose_path(state, lanes, tables, actor, 1)
         place_vehicle(state, lanes, actor)
 
 
-def _spots(
-    lanes: Lanes, tables: TrafficTables, plans: tuple[RoutePlan, ...], seed: int
-) -> list[tuple[int, float]]:
-    """Free places on lanes outside junctions, in an order drawn from the seed.
-
-    None where a lane only begins: there it lies over the lane beside it.
-    """
-    places = []
-    for lane in np.flatnonzero((tables.usable == 1) & (lanes.junction < 0)):
-        stations = np.arange(END_MARGIN_M, lanes.length_m[lane] - END_MARGIN_M, SPOT_SPACING_M)
-        full = FULL_SHARE * lanes.width_m[lanes.first[lane] :][: lanes.count[lane]].max()
-        widths = lanes.width_m[lanes.first[lane] + (stations / lanes.spacing_m[lane]).astype(int)]
-        places += [(int(lane), float(station)) for station in stations[widths >= full]]
-    xyz = np.array([_middle(lanes, lane, station) for lane, station in places]).reshape(-1, 3)
-    free = np.ones(len(places), bool)
+def _chosen(spots: Spots, plans: tuple[RoutePlan, ...], seed: int) -> NDArray[np.intp]:
+    """The places that no ego needs, in an order drawn from the seed."""
+    free = np.ones(len(spots.lane), bool)
     for plan in plans:
         near = plan.points[plan.route_m <= ROUTE_CLEARANCE_M, :3]
         for k, point in enumerate(near):
             reach = EGO_CLEARANCE_M if k == 0 else 0.5 * SPOT_SPACING_M
-            free &= np.linalg.norm(xyz - point, axis=1) > reach
-    order = sorted(
-        np.flatnonzero(free).tolist(),
-        key=lambda k: (int(keyed_hash(seed, int(Stream.TRAFFIC_SPAWN), 0, k)), k),
-    )
-    return [places[k] for k in order]
-
-
-def _middle(lanes: Lanes, lane: int, station: float) -> NDArray[np.float64]:
-    index = lanes.first[lane] + int(station / lanes.spacing_m[lane])
-    point: NDArray[np.float64] = lanes.points[index, :3]
-    return point
+            free &= np.linalg.norm(spots.place - point, axis=1) > reach
+    drawn = keyed_hashes(seed, int(Stream.TRAFFIC_SPAWN), 0, free.size)
+    chosen = np.flatnonzero(free)
+    return chosen[np.argsort(drawn[chosen], kind="stable")]
 
 
 def _equip(state: State, actor: int, seed: int) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from di_envs.numerics import keyed_random
-from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
+from di_envs.numerics.keyed_arrays import keyed_hashes, keyed_normals, keyed_uniforms, stream_of
 
 SEEDS = st.integers(0, 2**63 - 1)
 
@@ -45,3 +45,11 @@ def test_normal_draws_have_the_mean_and_spread_that_they_should():
 def test_streams_of_different_texts_differ():
     assert stream_of("noise:map,sigma=0.5") != stream_of("noise:map,sigma=0.6")
     assert stream_of("mask") == stream_of("mask")
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**63 + 5])
+def test_hashes_of_many_actors_are_those_of_each(seed):
+    found = keyed_hashes(seed, 3, 11, 20)
+    assert found.dtype == np.uint64
+    for actor, value in enumerate(found.tolist()):
+        assert value == int(keyed_random.keyed_hash(np.uint64(seed), 3, 11, actor))
