@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import agents
+from agents import loading
 from di_envs.edits.text import EditError
 from di_envs.edits.world import read_world_edits
 from di_envs.route_env import RouteEnv
@@ -187,13 +187,13 @@ def test_edits_travel_to_other_processes_as_values():
 
 def test_edits_are_checked_against_the_agent_that_says_what_it_requires(monkeypatch):
     made = []
-    original = agents._make
+    original = loading._make
 
     def counted(*arguments):
         made.append(arguments[0])
         return original(*arguments)
 
-    monkeypatch.setattr(agents, "_make", counted)
+    monkeypatch.setattr(loading, "_make", counted)
     with pytest.raises(SetupError, match="no taps that could be edited"):
         set_up(dataclasses.replace(spec("mask:bev,p=0.3"), isolate=False), Stopwatch())
     assert made == [AGENT]

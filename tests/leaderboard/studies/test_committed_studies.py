@@ -92,5 +92,5 @@ def test_the_pages_that_show_them_say_which_program_reads_them(folder):
         read_study(folder)
     with pytest.raises(ResultsError, match=r"has format version 2.*the version that wrote it"):
         read_run(folder / "rows" / BASELINE)
-    for name in ("findings", "studies", "explaining", "results"):
+    for name in ("findings", "studies", "results"):
         assert READ_BY in (DOCS / f"{name}.md").read_text(encoding="utf-8"), name
