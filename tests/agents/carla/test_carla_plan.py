@@ -16,6 +16,7 @@ from di_envs.suites import load_suite
 from di_envs.town.loading import load_town
 from leaderboard.autoagents.autonomous_agent import AutonomousAgent
 from leaderboard.utils.route_manipulation import downsample_route
+from tests.carla_wheel import carla_wheel
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +112,7 @@ print(here.location.x, here.location.y, here.location.z, here.rotation.yaw, here
 print(round(here.location.distance(there), 4))
 print(type(here).__module__.partition(".")[0])
 """
-    pytest.importorskip("carla")
+    carla_wheel()
     told = [
         subprocess.run(
             [sys.executable, "-c", code, how], capture_output=True, text=True, check=True

@@ -7,6 +7,7 @@ import pytest
 
 from di_envs.config import WEATHERS
 from di_envs.sensors.weather import PRESETS, Weather, look_of, weather_of
+from tests.carla_wheel import carla_wheel
 
 
 def test_the_presets_are_those_that_options_know():
@@ -14,7 +15,7 @@ def test_the_presets_are_those_that_options_know():
 
 
 def test_presets_hold_carlas_own_numbers():
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     for name, weather in PRESETS.items():
         if name == "Default":  # CARLA's own means "leave it as the map has it"
             continue

@@ -17,8 +17,9 @@ from di_envs.town.lanes import LaneKind, SignalKind
 from di_envs.town.loading import load_town
 from di_envs.town.queries import pose_at, project_to_lane, segment_at, width_at
 from di_envs.town.town import Town
+from tests.carla_wheel import carla_wheel
 
-carla = pytest.importorskip("carla", reason="the carla wheel (extra 'carla') is not installed")
+carla = carla_wheel()
 
 MAPS = ("Town01", "Town01_2020", "Town04_2020", "Town05")
 

@@ -21,6 +21,7 @@ from di_envs.town.routing.pieces import cut_lanes
 from di_envs.town.routing.road_graph import RoadGraph, build_road_graph
 from di_envs.town.routing.router import RouteError, plan_route, target_indices
 from di_envs.town.routing.routes import read_routes
+from tests.carla_wheel import carla_wheel
 
 LANEFOLLOW, CHANGE_LEFT = int(RoadOption.LANEFOLLOW), int(RoadOption.CHANGELANELEFT)
 
@@ -103,7 +104,7 @@ def test_the_short_routes_have_carlas_lengths_points_targets_and_timeouts(
 
 
 def test_keypoints_are_put_where_carla_puts_them(shared: Path, town05: RoadGraph) -> None:
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     carla_map = carla.Map("Town05", (shared / "data/xodr/Town05.xodr").read_text())
     for name in ("long", "short"):
         for spec in read_routes(shared / f"data/routes/routes_town05_{name}.xml"):
@@ -121,7 +122,7 @@ def test_keypoints_are_put_where_carla_puts_them(shared: Path, town05: RoadGraph
 @pytest.mark.parametrize("name", ["Town05", "Town01_2020", "Town04_2020"])
 def test_pieces_of_lanes_come_in_carlas_order(shared: Path, name: str) -> None:
     """The order settles ties between equally long ways; CARLA's is that of a C++ hash map."""
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     path = shared / f"data/xodr/{name}.xodr"
     town = load_town(path, signals="synthesise")
     topology = carla.Map(name, path.read_text()).get_topology()

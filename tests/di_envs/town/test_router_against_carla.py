@@ -21,9 +21,10 @@ from di_envs.town.plan import RoadOption, RoutePlan
 from di_envs.town.routing.road_graph import RoadGraph, build_road_graph
 from di_envs.town.routing.router import RouteError, plan_route
 from di_envs.town.routing.routes import read_routes
+from tests.carla_wheel import carla_wheel
 from tests.di_envs.town.carla_planner import CarlaPlanner, place
 
-carla = pytest.importorskip("carla", reason="the carla wheel (extra 'carla') is not installed")
+carla = carla_wheel()
 
 MAPS = ("Town01", "Town01_2020", "Town04_2020", "Town05")
 SAME_M = 0.05  # CARLA evaluates curves, we interpolate between points 0.5 m apart

@@ -14,6 +14,7 @@ from di_envs.town.building.street_plan import Control, read_plan
 from di_envs.town.building.town05 import FACTS, TOWN05, build_town05
 from di_envs.town.lanes import LaneKind, Turn
 from di_envs.town.loading import load_town
+from tests.carla_wheel import carla_wheel
 
 SAME_LEVEL_M = 2.0
 FOUR_WAYS_WITH_STOP_SIGNS = {"245", "334", "685"}
@@ -32,13 +33,13 @@ def xml():
 
 @pytest.fixture(scope="module")
 def ours():
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     return carla.Map("town05", TOWN05.read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
 def real(shared):
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     return carla.Map("Town05", (shared / "data/xodr/Town05.xodr").read_text(encoding="utf-8"))
 
 
@@ -265,7 +266,7 @@ def lanes_to_the_right(waypoint) -> int:
 def test_every_official_long_keypoint_snaps_to_the_same_lane_as_in_the_real_town(
     ours, real, shared
 ):
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     file = ET.parse(shared / "data/routes/routes_town05_long.xml")
     keypoints = [[float(w.get(k)) for k in "xyz"] for w in file.iterfind("route/waypoint")]
     assert len(keypoints) == 330

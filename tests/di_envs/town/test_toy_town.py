@@ -10,6 +10,7 @@ import pytest
 from di_envs.town.building.toy import TOY, build_toy
 from di_envs.town.lanes import LaneKind
 from di_envs.town.loading import load_town
+from tests.carla_wheel import carla_wheel
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def test_the_script_gives_the_shipped_file_byte_for_byte():
 
 
 def test_carla_loads_it_and_every_lane_leads_on():
-    carla = pytest.importorskip("carla")
+    carla = carla_wheel()
     town = carla.Map("toy", TOY.read_text(encoding="utf-8"))
     waypoints = town.generate_waypoints(1.0)
     assert all(waypoint.next(0.5) and waypoint.previous(0.5) for waypoint in waypoints)
