@@ -99,8 +99,10 @@ class Session:
             self.samples[0]
 
     def about_data(self) -> Mapping[str, Any]:
-        """The data card of each folder."""
-        return {str(folder): data_card(folder) for folder in self.plan.data}
+        """The data card of each folder, by its name: where it lay here is nobody's business."""
+        names = [folder.resolve().name for folder in self.plan.data]
+        called = names if len(set(names)) == len(names) else [*map(str, self.plan.data)]
+        return {name: data_card(at) for name, at in zip(called, self.plan.data, strict=True)}
 
 
 @contextmanager

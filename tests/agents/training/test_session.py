@@ -42,7 +42,7 @@ def test_what_is_known_only_as_it_begins_is_filled_in(plan):
     assert len(config.data) == 32
     assert config.init_from == ""
     assert (session.training.step, session.resumed, session.taken) == (0, False, ())
-    assert session.about_data().keys() == {str(plan.data[0])}
+    assert session.about_data().keys() == {plan.data[0].name}
     assert session.samples.training == config
 
 
