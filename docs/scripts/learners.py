@@ -139,8 +139,11 @@ def main(chosen: Learners) -> None:
     """Runs and scores them, and prints a row each."""
     page = (TOP / "docs" / "learning.md").read_text(encoding="utf-8")
     routes = [spec.route_id for spec in load_suite(SUITE).specs()][:: chosen.every]
-    print(HEAD, end="", flush=True)
     examples = EXAMPLE.findall(page)
+    titles = [title for title, _ in examples]
+    if not any(chosen.only in title for title in titles):
+        sys.exit(f"error: no example is called '{chosen.only}'; there are: {'; '.join(titles)}")
+    print(HEAD, end="", flush=True)
     for title, code in examples:
         if chosen.only not in title:
             continue
@@ -151,7 +154,7 @@ def main(chosen: Learners) -> None:
             rows += row
         if rows:
             (folder / "rows.md").write_text(rows, encoding="utf-8")
-    written = [folder_of(title, chosen.output) / "rows.md" for title, _ in examples]
+    written = [folder_of(title, chosen.output) / "rows.md" for title in titles]
     table = HEAD + "".join(path.read_text(encoding="utf-8") for path in written if path.exists())
     (chosen.output / "table.md").write_text(table, encoding="utf-8")
 

@@ -9,6 +9,7 @@ From the top of a checkout. `explain` and `report` need a Chromium on the path.
 from __future__ import annotations
 
 import io
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import tyro
 from PIL import Image
 
 from agents import load_agent
+from di_envs.config import check_name
 from di_envs.course import load_course
 from di_envs.drawing.driver_view import DriverView
 from di_envs.drawing.told_picture import told_picture
@@ -152,10 +154,15 @@ class Pictures:
 def main(pictures: Pictures) -> None:
     """Drives and draws."""
     for name in pictures.names:
+        check_name(name, PICTURES, "picture")
+    for name in pictures.names:
         with tempfile.TemporaryDirectory() as folder:
             PICTURES[name](Path(folder))
         print(f"written: docs/images/{name}.*")
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Pictures, description=__doc__))
+    try:
+        main(tyro.cli(Pictures, description=__doc__))
+    except ValueError as error:
+        sys.exit(f"error: {error}")
