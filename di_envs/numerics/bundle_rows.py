@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
-import di_envs.numerics.bundles  # noqa: F401  # isort: skip (says how Numba knows bundles)
+from di_envs.numerics.bundles import unboxed_by  # isort: skip (says how Numba knows bundles)
 import numba
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import types
 from numba.extending import (
-    NativeValue,
     intrinsic,
     models,
     overload,
@@ -78,12 +77,7 @@ class _RowModel(models.OpaqueModel):
     """A pointer to the block of addresses."""
 
 
-@unbox(BundleRowType)
-def _unbox(_typ: BundleRowType, value: Any, c: Any) -> NativeValue:
-    address = c.pyapi.object_getattr_string(value, "row_address")
-    pointer = c.pyapi.long_as_voidptr(address)
-    c.pyapi.decref(address)
-    return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+unbox(BundleRowType)(unboxed_by("row_address"))
 
 
 @intrinsic

@@ -9,6 +9,7 @@ describes its arrays; `bundle.field` reads one description from there. Python se
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -124,12 +125,19 @@ class _BundleModel(models.OpaqueModel):
     """A pointer to the block."""
 
 
-@unbox(BundleType)
-def _unbox(_typ: BundleType, value: Any, c: Any) -> NativeValue:
-    address = c.pyapi.object_getattr_string(value, "bundle_address")
-    pointer = c.pyapi.long_as_voidptr(address)
-    c.pyapi.decref(address)
-    return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+def unboxed_by(attribute: str) -> Callable[[types.Type, Any, Any], NativeValue]:
+    """How a kernel takes what an object's attribute says the address of: as a pointer."""
+
+    def unboxed(_typ: types.Type, value: Any, c: Any) -> NativeValue:
+        address = c.pyapi.object_getattr_string(value, attribute)
+        pointer = c.pyapi.long_as_voidptr(address)
+        c.pyapi.decref(address)
+        return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+
+    return unboxed
+
+
+unbox(BundleType)(unboxed_by("bundle_address"))
 
 
 @infer_getattr

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import di_envs.numerics.kernels  # noqa: F401  # isort: skip (says how Numba loads, so it comes first)
+from di_envs.numerics.bundles import unboxed_by  # isort: skip (says how Numba loads, so it comes first)
 import numba
 from numba.core import cgutils, types
 from numba.extending import (
-    NativeValue,
     intrinsic,
     models,
     overload,
@@ -71,12 +70,7 @@ class _CodeModel(models.OpaqueModel):
     """A pointer to the code."""
 
 
-@unbox(MachineCodeType)
-def _unbox(_typ: MachineCodeType, value: Any, c: Any) -> NativeValue:
-    address = c.pyapi.object_getattr_string(value, "code_address")
-    pointer = c.pyapi.long_as_voidptr(address)
-    c.pyapi.decref(address)
-    return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+unbox(MachineCodeType)(unboxed_by("code_address"))
 
 
 @intrinsic
