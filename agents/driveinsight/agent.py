@@ -21,11 +21,10 @@ from agents.driveinsight.explained import ExplainedAgent
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.memory import MemoryBank
 from agents.driveinsight.model import Inputs, Output, Policy
-from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
+from agents.driveinsight.tap_edits import DecisionMoment, EditedDecision, Passed, TapEdit
 from agents.driveinsight.weights import WeightsError, from_pretrained
 from agents.hub import HubError, local_folder
 from agents.networks.fused import fuse_norms
-from agents.networks.taps import editing
 from agents.one_thread import one_thread
 from di_envs.actions.controllers import (
     ControllerMemory,
@@ -50,12 +49,14 @@ class DriveInsightMemory:
         controllers: Past errors.
         seed: Of the episode: draws of edits inside the policy are keyed by it.
         decision: How many there have been.
+        passed: What has passed the edits inside the policy; see `tap_edits`.
     """
 
     frames: tuple[Frame, ...] = ()
     controllers: ControllerMemory = field(default_factory=ControllerMemory)
     seed: int = 0
     decision: int = 0
+    passed: tuple[Passed, ...] = ()
 
 
 class DriveInsightAgent:
@@ -104,7 +105,7 @@ class DriveInsightAgent:
         """One decision."""
         config = self.policy.config
         with one_thread(), torch.inference_mode():
-            inputs, output = self._decide(observation, memory)
+            inputs, output, passed = self._decide(observation, memory)
         frames = memory.frames
         if output.remembered is not None and inputs.pose is not None:
             reach = config.memory_frames * self._every
@@ -120,6 +121,7 @@ class DriveInsightAgent:
             controllers=controllers,
             seed=memory.seed,
             decision=memory.decision + 1,
+            passed=passed,
         )
 
     def plan(self, observation: Observation, memory: DriveInsightMemory) -> Output:
@@ -132,13 +134,15 @@ class DriveInsightAgent:
 
     def _decide(
         self, observation: Observation, memory: DriveInsightMemory
-    ) -> tuple[Inputs, Output]:
+    ) -> tuple[Inputs, Output, tuple[Passed, ...]]:
         inputs = self._inputs(observation, memory)
         moment = DecisionMoment(
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
-        with editing(self.policy, tap_edits(self._edits, moment)):
-            return inputs, self.policy(inputs, self._bank(memory.frames))
+        edited = EditedDecision(self._edits, moment, memory.passed)
+        with edited.of(self.policy):
+            output = self.policy(inputs, self._bank(memory.frames))
+        return inputs, output, edited.passed
 
     def _inputs(self, observation: Observation, memory: DriveInsightMemory) -> Inputs:
         return inputs_of(self.policy.config, observation)

@@ -4,6 +4,7 @@
     zero:TAP                the activation is zeros; `zero:bev` is the fused BEV map
     mask:TAP,p=0.3          each cell of a map, or token, is zeroed at random, at every decision
     noise:TAP,sigma=0.1     Gaussian noise on every number
+    delay:bev,steps=50      what passed fifty decisions ago: right in kind, wrong for this moment
     identity:TAP            nothing is changed
 
 A tap is named as `tap_names` has it, such as `perception.memory.bev` or `prompt.taps.routing`;
@@ -12,8 +13,9 @@ A tap is named as `tap_names` has it, such as `perception.memory.bev` or `prompt
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from typing_extensions import Self
 
-from agents.networks.taps import Edit, tap_names
+from agents.networks.taps import Edit, editing, tap_names
 from di_envs.config import check_name
 from di_envs.edits.conditions import ALWAYS, Condition
 from di_envs.edits.text import EditError, EditText
@@ -30,9 +32,16 @@ from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_
 BEV = "bev"
 _BEV_MAP = "perception.memory.bev"
 _BEV_TOKENS = "bev.tokens"
-# What each verb must be told, and up to where it goes
-_AMOUNTS = {"drop": "", "zero": "", "identity": "", "mask": "p", "noise": "sigma"}
-_MOST = {"": 0.0, "p": 1.0, "sigma": float("inf")}
+_AT_TOKENS = ("drop", "delay")  # verbs that take `bev` where the planner does
+# What each verb must be told, up to where it goes, and what one may write
+_AMOUNTS = {
+    "drop": "", "zero": "", "identity": "", "mask": "p", "noise": "sigma", "delay": "steps",
+}  # fmt: skip
+_MOST = {"": 0.0, "p": 1.0, "sigma": float("inf"), "steps": float("inf")}
+_EXAMPLES = {"": "", "p": ",p=0.3", "sigma": ",sigma=0.3", "steps": ",steps=50"}
+
+# What passed an edit's tap at each of the last decisions, newest first, in the order of the calls
+Passed = tuple[tuple[Tensor, ...], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +66,7 @@ class TapEdit:
     Attributes:
         verb: What is done.
         tap: The tap's full name.
-        amount: Of a mask or of noise.
+        amount: Of a mask or of noise, or how many decisions a delay goes back.
         when: While it holds; of time alone.
         stream: What its draws are keyed by.
     """
@@ -82,11 +91,12 @@ class TapEdit:
         name = _AMOUNTS[text.verb]
         text.refuse_settings_but((name, "seed") if name else ())
         if text.value is not None or (name and name not in text.settings):
-            example = f",{name}=0.3" if name else ""
-            raise EditError(f"'{text}': write {text.verb}:{text.target}{example}")
+            raise EditError(f"'{text}': write {text.verb}:{text.target}{_EXAMPLES[name]}")
         amount = text.number(name) if name else 0.0
         if not 0.0 <= amount <= _MOST[name]:
             raise EditError(f"'{text}': {name} lies in [0, {_MOST[name]:g}], not {amount:g}")
+        if name == "steps" and amount != int(amount):
+            raise EditError(f"'{text}': steps is a whole number, not {amount:g}")
         when = Condition.of(text.when)
         when.refuse_names_but(("t",), "inside a policy")
         stream = stream_of(f"tap edit {text.verb}:{text.target} {dict(text.settings)}")
@@ -124,13 +134,58 @@ class TapEdit:
         return _like(keyed_normals(moment.seed, self.stream, moment.decision, shape), activation)
 
 
-def tap_edits(edits: Sequence[TapEdit], moment: DecisionMoment) -> dict[str, Edit]:
-    """Functions for `taps.editing`: of each tap, those edits that hold, one after the other."""
-    chains: dict[str, list[Edit]] = {}
-    for edit in edits:
-        if edit.when.holds({"t": moment.time_s}):
-            chains.setdefault(edit.tap, []).append(edit.at(moment))
-    return {tap: _chained(chain) for tap, chain in chains.items()}
+@dataclass
+class EditedDecision:
+    """One decision of a network that is edited, and what passes the taps of edits that delay.
+
+    Attributes:
+        edits: All edits of the network.
+        moment: When it decides.
+        before: What passed each edit's tap at the decisions before; empty at the first.
+    """
+
+    edits: Sequence[TapEdit]
+    moment: DecisionMoment
+    before: tuple[Passed, ...] = ()
+    _now: list[list[Tensor]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.before = self.before or ((),) * len(self.edits)
+        self._now = [[] for _ in self.edits]
+
+    @contextmanager
+    def of(self, network: nn.Module) -> Iterator[None]:
+        """Puts the edits that hold in the way of the network's taps, in their order."""
+        chains: dict[str, list[Edit]] = {}
+        for number, edit in enumerate(self.edits):
+            holds = edit.when.holds({"t": self.moment.time_s})
+            if edit.verb == "delay":
+                chains.setdefault(edit.tap, []).append(self._delay(number, holds))
+            elif holds:
+                chains.setdefault(edit.tap, []).append(edit.at(self.moment))
+        with editing(network, {tap: _chained(chain) for tap, chain in chains.items()}):
+            yield
+
+    @property
+    def passed(self) -> tuple[Passed, ...]:
+        """What the next decision must know as `before`."""
+        return tuple(
+            ((tuple(now), *before)[: int(edit.amount)]) if edit.verb == "delay" else ()
+            for edit, now, before in zip(self.edits, self._now, self.before, strict=True)
+        )
+
+    def _delay(self, number: int, holds: bool) -> Edit:
+        before, now = self.before[number], self._now[number]
+        steps = int(self.edits[number].amount)
+
+        def edit(activation: Tensor) -> Tensor:
+            now.append(activation)
+            if not (holds and before and steps):
+                return activation
+            # until there is anything so old, what the episode began with
+            return before[min(steps, len(before)) - 1][len(now) - 1].clone()
+
+        return edit
 
 
 def _chained(chain: Sequence[Edit]) -> Edit:
@@ -145,7 +200,7 @@ def _chained(chain: Sequence[Edit]) -> Edit:
 def _tap(target: str, text: EditText, policy: nn.Module) -> str:
     known = tap_names(policy)
     if target == BEV and _BEV_TOKENS in known:
-        return _BEV_TOKENS if text.verb == "drop" else _BEV_MAP
+        return _BEV_TOKENS if text.verb in _AT_TOKENS else _BEV_MAP
     try:
         check_name(target, known, "tap of the policy")
     except ValueError as error:

@@ -18,11 +18,10 @@ from typing_extensions import Self
 
 from agents import AGENTS, AgentSpecError
 from agents.base import Control, Observation, make_control
-from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
+from agents.driveinsight.tap_edits import DecisionMoment, EditedDecision, Passed, TapEdit
 from agents.explain.protocol import Anatomy
 from agents.hub import HubError, local_folder
 from agents.networks.fused import fuse_norms
-from agents.networks.taps import editing
 from agents.networks.weights import WeightsError
 from agents.one_thread import one_thread
 from agents.zoo.controls import FOLLOWING, PidT
@@ -48,6 +47,7 @@ class SystemMemory:
         rules: Of the hand-written rules of a system that has some.
         seed: Of the episode: draws of edits inside the network are keyed by it.
         decision: How many there have been.
+        passed: What has passed the edits inside the network; see `tap_edits`.
     """
 
     states: tuple[State, ...] = ()
@@ -55,6 +55,7 @@ class SystemMemory:
     rules: Any = None
     seed: int = 0
     decision: int = 0
+    passed: tuple[Passed, ...] = ()
 
 
 class SystemAgent:
@@ -108,7 +109,8 @@ class SystemAgent:
     def act(self, observation: Observation, memory: SystemMemory) -> tuple[Control, SystemMemory]:
         """One decision."""
         with one_thread(), torch.inference_mode():
-            output = self.decide(observation, memory)
+            edited = self._edited(memory)
+            output = self.decide(observation, memory, edited)
         control, controllers, rules = self.control(output, observation, memory)
         states = ((output.state, *memory.states)[:_EVERY]) if output.state else ()
         return control, SystemMemory(
@@ -117,17 +119,29 @@ class SystemAgent:
             rules=rules,
             seed=memory.seed,
             decision=memory.decision + 1,
+            passed=edited.passed,
         )
 
-    def decide(self, observation: Observation, memory: SystemMemory) -> Output:
-        """What the network says, as part of torch's graph."""
+    def decide(
+        self, observation: Observation, memory: SystemMemory, edited: EditedDecision | None = None
+    ) -> Output:
+        """What the network says, as part of torch's graph.
+
+        Args:
+            observation: What the agent sees.
+            memory: What it remembers.
+            edited: Who makes the edits inside the network, for those who go on from there.
+        """
         state = memory.states[_EVERY - 1] if len(memory.states) == _EVERY else None
+        with (edited or self._edited(memory)).of(self.network):
+            output: Output = self.network(self.seen(observation, memory), state)
+        return output
+
+    def _edited(self, memory: SystemMemory) -> EditedDecision:
         moment = DecisionMoment(
             seed=memory.seed, decision=memory.decision, time_s=memory.decision * CONTROL_DT_S
         )
-        with editing(self.network, tap_edits(self._edits, moment)):
-            output: Output = self.network(self.seen(observation, memory), state)
-        return output
+        return EditedDecision(self._edits, moment, memory.passed)
 
     def seen(self, observation: Observation, memory: SystemMemory) -> dict[str, Tensor]:
         """What the network is shown: everything, unless a system shuts its eyes."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from agents import AgentSpecError
 from agents.base import Observation
+from agents.driveinsight.tap_edits import EditedDecision
 from agents.zoo.driving import SystemAgent, SystemMemory
 from agents.zoo.system import Output
 from di_envs.files.names import check_name
@@ -37,7 +38,9 @@ class RoachAgent(SystemAgent):
         super().__init__(shipped=shipped, weights=weights, rules=rules)
         self._by = by
 
-    def decide(self, observation: Observation, memory: SystemMemory) -> Output:
+    def decide(
+        self, observation: Observation, memory: SystemMemory, edited: EditedDecision | None = None
+    ) -> Output:
         """What the network says, of which only what it is driven by is left."""
-        output = super().decide(observation, memory)
+        output = super().decide(observation, memory, edited)
         return output if self._by == "action" else dataclasses.replace(output, action=None)

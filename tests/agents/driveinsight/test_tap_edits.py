@@ -12,7 +12,7 @@ from agents.driveinsight.agent import DriveInsightAgent
 from agents.driveinsight.config import PolicyConfig, config_named
 from agents.driveinsight.inputs import inputs_of
 from agents.driveinsight.model import Policy
-from agents.driveinsight.tap_edits import DecisionMoment, TapEdit, tap_edits
+from agents.driveinsight.tap_edits import DecisionMoment, EditedDecision, TapEdit
 from agents.driveinsight.weights import save_pretrained
 from agents.networks.taps import editing, watching
 from di_envs.edits.text import EditError, read_edits
@@ -45,8 +45,8 @@ def read(text, policy):
 
 
 def planned(policy, inputs, text="", moment=NOW):
-    edits = tap_edits(read(text, policy), moment)
-    with torch.inference_mode(), editing(policy, edits), watching(policy) as seen:
+    edited = EditedDecision(read(text, policy), moment)
+    with torch.inference_mode(), edited.of(policy), watching(policy) as seen:
         waypoints = policy(inputs).waypoints
     return waypoints, {name: passed[0] for name, passed in seen.items()}
 
@@ -114,6 +114,26 @@ def test_a_masked_map_loses_whole_cells_and_that_share_of_them(seeing):
     assert lost.float().mean() == pytest.approx(0.3, abs=0.05)
 
 
+@pytest.mark.parametrize(("text", "shown"), [
+    ("delay:bev,steps=2", [0, 0, 0, 1]),
+    ("delay:bev,steps=0", [0, 1, 2, 3]),
+    ("delay:bev,steps=2@t>0.25", [0, 1, 2, 1]),
+])  # fmt: skip
+def test_a_delay_shows_the_planner_what_was_seen_that_many_decisions_ago(seeing, text, shown):
+    decisions = [random_inputs(seeing.config, seed=seed) for seed in range(4)]
+    tokens = [planned(seeing, inputs)[1]["bev.tokens"] for inputs in decisions]
+    edits, passed = read(text, seeing), ()
+    for number, inputs in enumerate(decisions):
+        moment = DecisionMoment(seed=3, decision=number, time_s=number * 0.1)
+        delayed = EditedDecision(edits, moment, passed)
+        with torch.inference_mode():
+            with delayed.of(seeing):
+                got = seeing(inputs).waypoints
+            with editing(seeing, {"bev.tokens": lambda _, old=tokens[shown[number]]: old}):
+                assert torch.equal(got, seeing(inputs).waypoints)
+        passed = delayed.passed
+
+
 def test_draws_are_keyed_by_the_seed_and_the_decision(seeing):
     inputs = random_inputs(seeing.config)
 
@@ -131,6 +151,9 @@ def test_draws_are_keyed_by_the_seed_and_the_decision(seeing):
     [
         ("mask:bevv,p=0.3", "Unknown tap of the policy 'bevv'"),
         ("mask:bev", "write mask:bev,p=0.3"),
+        ("delay:bev", "write delay:bev,steps=50"),
+        ("delay:bev,steps=2.5", "steps is a whole number, not 2.5"),
+        ("delay:bev,steps=-1", r"steps lies in \[0, inf\], not -1"),
         ("mask:bev,p=2", r"p lies in \[0, 1\], not 2"),
         ("blackout:bev", "Unknown edit of an activation 'blackout'"),
         ("zero:bev@junction<9", "inside a policy only t is known"),
@@ -146,20 +169,24 @@ def test_a_policy_without_bev_has_none_to_edit(prompted):
         read("mask:bev,p=0.3", prompted)
 
 
-def test_an_edited_agent_acts_otherwise_and_leaves_the_first_as_it_was(prompted, tmp_path):
+@pytest.mark.parametrize(
+    "edit", ["noise:waypoints,sigma=5@t>0.05", "delay:waypoints,steps=1@t>0.05"]
+)
+def test_an_edited_agent_acts_otherwise_and_leaves_the_first_as_it_was(prompted, edit, tmp_path):
     save_pretrained(prompted, tmp_path, card="Not trained.")
     agent = DriveInsightAgent(weights=tmp_path)
     inputs = random_inputs(prompted.config)
     observation = {name: value[0].numpy() for name, value in inputs.prompt.items()}
     observation["prompt_present"] = np.ones(len(COMPONENTS), np.int8)
-    edited = agent.edited(read_edits("noise:waypoints,sigma=5@t>0.05"))
+    edited = agent.edited(read_edits(edit))
     seen = []
     for driver in (agent, edited, agent, edited):
-        memory, controls = driver.start(None, 5), []
-        for _ in range(3):
-            control, memory = driver.act(observation, memory)
-            controls.append(control)
-        seen.append(np.array(controls))
+        memory, plans = driver.start(None, 5), []
+        for speed in (0.0, 4.0, 8.0):
+            observation["speed"] = np.array([speed], np.float32)
+            plans.append(driver.plan(observation, memory).waypoints.detach().numpy())
+            _, memory = driver.act(observation, memory)
+        seen.append(np.array(plans))
     assert np.array_equal(seen[0], seen[2])
     assert np.array_equal(seen[1], seen[3])
     assert np.array_equal(seen[0][0], seen[1][0])  # 0.05 s have not passed yet
