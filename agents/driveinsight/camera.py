@@ -5,6 +5,7 @@ Source: the paper, section 3.1, "Camera Encoder".
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -110,5 +111,6 @@ class CameraEncoder(nn.Module):
             view(torch.addcmul(self.shift, group.float(), self.scale))
             for view, group in zip(self.views, images, strict=True)
         ]
-        lifted = torch.stack([view[0] for view in views]).sum(dim=0)
+        # not stacked: each map keeps its channels last, as convolutions want them
+        lifted = functools.reduce(torch.add, (view[0] for view in views))
         return self.bev(lifted), tuple(view[1] for view in views), views[self._sharpest][2]

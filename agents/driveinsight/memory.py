@@ -156,5 +156,6 @@ class TemporalFusion(nn.Module):
             assert pose is not None, "this policy has a memory: give pose"
             assert bank is not None, "this policy has a memory: give a bank"
             brought = warp(bank.features[:, k], bank.poses[:, k], pose, self.grid)
+            brought = brought.contiguous(memory_format=torch.channels_last)
             past.append(brought * bank.valid[:, k, None, None, None])
         return self.bev(self.mix(torch.cat([features, *past], dim=1)))

@@ -25,7 +25,7 @@ def read_seen(heads: Heads, grid: GridConfig) -> Seen:
 
 def _objects(heads: Heads, grid: GridConfig) -> Tensor:
     """(B, OBJECTS, 9)."""
-    scores = heads.heat.float().sigmoid()  # (B, 3, X, Y)
+    scores = heads.heat.float().sigmoid().contiguous()  # (B, 3, X, Y), pooled one by one
     with torch.no_grad():
         highest = torch.cat(
             [
