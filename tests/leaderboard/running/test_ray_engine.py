@@ -9,7 +9,9 @@ import os
 import shutil
 import signal
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -20,10 +22,11 @@ from leaderboard.commands.ending import EXIT_USAGE
 from leaderboard.records.record import RunRecord
 from leaderboard.running.driver import Driver
 from leaderboard.running.jobs import RunSpec, SetupError, plan_jobs
-from leaderboard.running.messages import RunFacts
+from leaderboard.running.messages import Driven, RunFacts
 from leaderboard.running.runner import evaluate
 from leaderboard.running.setting_up import run_facts, set_up
 from leaderboard.running.wall_clock import Stopwatch
+from leaderboard.running.workers.local_engine import Engine
 from leaderboard.running.workers.ray_engine import RayEngine, check_footing
 from leaderboard.studies.study_file import read_study
 
@@ -48,13 +51,15 @@ def cluster(function):
     return function
 
 
-def evaluated(spec: RunSpec, seeds: list[int], folder: Path, said: io.StringIO) -> RunRecord:
+def evaluated(
+    spec: RunSpec, seeds: list[int], folder: Path, said: io.StringIO, engine: Engine | None = None
+) -> RunRecord:
     return evaluate(
         spec,
         seeds,
         suite=TOY,
         folder=folder,
-        engine=RayEngine(workers=2),
+        engine=engine or RayEngine(workers=2),
         console=Console(file=said, width=200),
     )
 
@@ -67,6 +72,43 @@ def test_the_bits_are_those_of_this_process_though_an_actor_dies(tmp_path, monke
     said = io.StringIO()
     run = evaluated(spec, [0, 1, 2, 3], tmp_path / "run", said)
     assert f"route {ROUTE}, seed 2: Failed - Worker died, tried again: the Ray " in said.getvalue()
+    assert run.complete
+    with Driver(spec) as driver:
+        here = [driver.drive(job).fingerprint() for job in plan_jobs([ROUTE], [0, 1, 2, 3])]
+    assert [record.fingerprint() for record in run.routes] == here
+
+
+@dataclass
+class LosesItsMachine:
+    """Ray whose only machine that drives goes after two routes, and another comes."""
+
+    machines: Any
+    driving: Any
+
+    def run(self, spec, jobs):
+        driven = 0
+        for event in RayEngine(address=self.machines.address).run(spec, jobs):
+            yield event
+            driven += isinstance(event, Driven)
+            if driven == 2 and self.driving is not None:
+                self.machines.remove_node(self.driving, allow_graceful=False)
+                self.driving = None
+                self.machines.add_node(num_cpus=1)
+
+
+@cluster
+def test_the_bits_are_those_of_this_process_though_a_machine_is_lost(tmp_path):
+    from ray.cluster_utils import Cluster
+
+    spec = RunSpec(agent="constant", options=OPTIONS)
+    machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    try:
+        engine = LosesItsMachine(machines, machines.add_node(num_cpus=1))
+        said = io.StringIO()
+        run = evaluated(spec, [0, 1, 2, 3], tmp_path / "run", said, engine)
+    finally:
+        machines.shutdown()
+    assert "Failed - Worker died, tried again: the Ray worker is gone" in said.getvalue()
     assert run.complete
     with Driver(spec) as driver:
         here = [driver.drive(job).fingerprint() for job in plan_jobs([ROUTE], [0, 1, 2, 3])]
