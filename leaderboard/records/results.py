@@ -4,10 +4,11 @@
     RUN/routes/0007.json    one route driven once, whole: score, events, controls, trace, hashes
     RUN/results.json        the table of all routes so far, in CARLA's schema
 
-The run's file is written once and each route's once, so a run of a thousand routes writes no more
-for the last than for the first. Every file is replaced in one step: a reader, or whoever resumes
-after a kill, finds a route whole or not at all. A route's file names the run it belongs to by a
-hash of the run's file, so routes of two runs are never counted together.
+The run's file is written once and each route's once, and the table, which is all routes again, ever
+more rarely: a run of ten thousand routes does no more for the last than for the first. Every file
+is replaced in one step: a reader, or whoever resumes after a kill, finds a route whole or not at
+all. A route's file names the run it belongs to by a hash of the run's file, so routes of two runs
+are never counted together.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ RECORD_FILE = "driveinsight.json"
 ROUTES_FOLDER = "routes"
 ROUTE_FILE = r"[0-9]{4,}\.json"  # a pattern for the names of those in it
 
+_TABLES = 16  # of the routes so far, one in so many brings a new table
+
 _Value = TypeVar("_Value")
 
 
@@ -80,7 +83,9 @@ def start_run(folder: Path, run: RunRecord) -> None:
 
 
 def add_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
-    """Writes one more route of a run that was started, then CARLA's table.
+    """Writes one more route of a run that was started, and CARLA's table when that is due.
+
+    It may lack the last routes, one in 16 at most: `write_table` when there are no more.
 
     Args:
         folder: The run's.
@@ -91,7 +96,8 @@ def add_route(folder: Path, run: RunRecord, record: RouteRecord) -> None:
         ResultsError: If the folder cannot be written to.
     """
     _write(folder, partial(_write_route, folder, run, record))
-    write_table(folder, run)
+    if len(run.routes) % max(len(run.routes) // _TABLES, 1) == 0:
+        write_table(folder, run)
 
 
 def write_table(folder: Path, run: RunRecord) -> None:

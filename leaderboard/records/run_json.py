@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping
@@ -34,7 +35,7 @@ def run_hash(run: RunRecord) -> str:
 
 def run_to_json(run: RunRecord) -> dict[str, Any]:
     """The run as JSON values, without its routes."""
-    fields = to_json(run)
+    fields = to_json(dataclasses.replace(run, routes=()))
     del fields["routes"]
     for name in _SINCE:
         if not fields[name]:

@@ -23,7 +23,7 @@ from di_envs.suites import Suite
 from leaderboard.records.folder_lock import folder_lock
 from leaderboard.records.own_files import prepare_folder, take_away
 from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.records.results import add_route, start_run
+from leaderboard.records.results import add_route, start_run, write_table
 from leaderboard.records.resuming import resumed
 from leaderboard.running.agent_place import drives_apart
 from leaderboard.running.displays.run import RunDisplay
@@ -107,6 +107,7 @@ def evaluate(
         run = evaluation.run
         if run is None:  # stopped before it was known what there is to drive
             raise KeyboardInterrupt
+        write_table(folder, run)
         if interruption.requested:
             console.print(f"interrupted: {len(run.routes)} of {run.planned} routes are kept")
         return run

@@ -21,7 +21,9 @@ from leaderboard.records.results import (
     RECORD_FILE,
     DamagedError,
     ResultsError,
+    add_route,
     read_run,
+    start_run,
     write_run,
 )
 from leaderboard.records.run_json import route_from_json, route_to_json, run_from_json, run_to_json
@@ -265,6 +267,22 @@ def test_files_are_written_whole_and_leave_no_scratch_behind(tmp_path):
     assert sorted(os.listdir(tmp_path)) == [RECORD_FILE, CARLA_FILE, "routes"]
     assert sorted(os.listdir(tmp_path / "routes")) == ["0000.json", "0001.json"]
     assert len(read_run(tmp_path).routes) == 2
+
+
+def test_the_table_of_a_long_run_is_written_ever_more_rarely_and_lacks_few_routes(tmp_path):
+    records = tuple(route(route_id=str(index), index=index) for index in range(120))
+    run, tables = replace(run_of(), planned=120), set()
+    (tmp_path / "routes").mkdir()
+    start_run(tmp_path, run)
+    for done in range(1, 121):
+        add_route(tmp_path, replace(run, routes=records[:done]), records[done - 1])
+        table = json.loads((tmp_path / CARLA_FILE).read_text())
+        shown = len(table["_checkpoint"]["records"])
+        assert done - done // 16 <= shown <= done
+        tables.add(shown)
+    assert set(range(1, 32)) <= tables
+    assert len(tables) < 70
+    assert len(read_run(tmp_path).routes) == 120
 
 
 def test_half_a_file_is_named_as_such(tmp_path):
