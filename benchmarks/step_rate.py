@@ -32,7 +32,6 @@ from step_works import (
     WARM_UP_S,
     Work,
     drive_works,
-    growth_works,
     prompt_env,
     record_drive,
 )
@@ -42,7 +41,7 @@ from di_envs.numerics.kernels import cpu_capability
 from di_envs.route_env import RouteEnv
 from di_envs.world.state import TICK_S
 
-PARTS = ("rate", "highway", "growth", "start")
+PARTS = ("rate", "highway", "start")
 
 # What a user's first lines cost: run in a process of its own.
 FIRST_STEPS = """
@@ -178,16 +177,6 @@ def measure_highway(bench: Bench, world_tick: Times | None) -> None:
         )
 
 
-def measure_growth(bench: Bench) -> None:
-    """The cost of a tick as traffic grows, without an ego."""
-    times = bench.time("traffic from 30 to 240 vehicles", growth_works())
-    print("\n## Cost of a world tick as traffic grows (no ego)\n")
-    print("| vehicles | walkers | median [µs a tick] | best round |")
-    print("|---:|---:|---:|---:|")
-    for case, own in times.items():
-        print(f"| {case} | {1e6 * own.median_s:.1f} | {1e6 * own.best_s:.1f} |")
-
-
 def measure_start(bench: Bench) -> None:
     """The first steps in a fresh process: with nothing compiled or parsed before, and after."""
     with tempfile.TemporaryDirectory() as folder:
@@ -255,8 +244,6 @@ def main() -> None:
     rate = measure_rates(bench) if "rate" in arguments.parts else None
     if "highway" in arguments.parts:
         measure_highway(bench, rate)
-    if "growth" in arguments.parts:
-        measure_growth(bench)
     if "start" in arguments.parts:
         measure_start(bench)
 
