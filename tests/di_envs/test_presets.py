@@ -16,7 +16,15 @@ import di_envs
 from di_envs.config import RouteEnvConfig, UnknownOptionError
 from di_envs.observation import observation_space
 from di_envs.presets import FLAT_LIMIT, Form
-from di_envs.prompt_numbers import ROUTE_SAMPLES
+from di_envs.prompt_numbers import (
+    FLAT_NUMBERS,
+    ROUTE_SAMPLES,
+    flat_numbers,
+    numbers_of,
+    prompt_numbers,
+    to_route,
+    to_route_of_arrays,
+)
 from di_envs.testing import check_environment
 from di_envs.world.kinds import ActorKind
 
@@ -76,6 +84,30 @@ def test_the_vector_is_the_prompt_by_arithmetic():
     light = [0.25, 0.0, 1.0, 0.0, 9 / 50, 0.0, 0.0, 0.0, 1.0, 1.0]
     assert vector[256:266].tolist() == pytest.approx(light)
     assert not vector[266:].any()
+
+
+def test_the_vector_is_taken_apart_into_the_tables_that_it_was_made_of():
+    prompt = Form(PROMPT, "box").of(a_prompt())
+    numbers = prompt_numbers(prompt, np)
+    flat = flat_numbers(numbers, np)
+    assert flat.shape == (FLAT_NUMBERS,)
+    for name, part in numbers_of(np.stack([flat, 2.0 * flat]))._asdict().items():
+        there = getattr(numbers, f"{name}_valid", 1.0)
+        expected = getattr(numbers, name) * there
+        np.testing.assert_array_equal(part, np.stack([expected, 2.0 * expected]), err_msg=name)
+
+
+@pytest.mark.parametrize("shape", [(5,), (3, 5), (2, 3, 5)])
+def test_places_on_the_route_are_the_same_bits_by_the_kernel_as_by_whole_arrays(shape):
+    draws = np.random.default_rng(0)
+    x, y = (draws.normal(0.0, 20.0, (*shape, 2)).astype(np.float32)[..., k] for k in range(2))
+    routing = draws.normal(0.0, 20.0, (*shape[:-1], 50, 4)).astype(np.float32)
+    routing[..., 3] = draws.random((*shape[:-1], 50)) < 0.7
+    routing[..., 10, :] = routing[..., 5, :]  # as near: the first one counts
+    for by_kernel, by_arrays in zip(
+        to_route_of_arrays(x, y, routing), to_route(x, y, routing, np), strict=True
+    ):
+        np.testing.assert_array_equal(by_kernel, by_arrays)
 
 
 def test_what_else_there_is_follows_in_the_vector_each_by_its_largest():
