@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict
-from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import FlattenObservation
 
@@ -122,6 +122,21 @@ def test_no_number_of_a_vector_is_beyond_its_bounds():
     most = {name: np.asarray(getattr(part, "high", 1)) for name, part in PROMPT.items()}
     vector = Form(PROMPT, "flat").of({**most, "command": np.int64(6)})
     assert vector.max() == FLAT_LIMIT  # the length of a car of 100 m
+
+
+@pytest.mark.parametrize("preset", ["box", "flat"])
+def test_each_of_several_egos_is_shown_what_it_sees_itself(preset):
+    form = Form(PROMPT, preset)
+    plain, shown = (
+        di_envs.parallel_env(3, suite="toy", preset=chosen, **QUIET) for chosen in (None, preset)
+    )
+    raw, seen = plain.reset(seed=1)[0], shown.reset(seed=1)[0]
+    for throttle in (0.2, 0.9):
+        assert list(seen) == ["ego_0", "ego_1", "ego_2"]
+        for name, own in seen.items():
+            assert data_equivalence(form.of(raw[name]), own, exact=True)
+        actions = {name: np.array([throttle, 0.0, 0.0], np.float32) for name in seen}
+        raw, seen = plain.step(actions)[0], shown.step(actions)[0]
 
 
 @pytest.mark.parametrize("preset", ["box", "flat"])
