@@ -20,6 +20,7 @@ from pettingzoo import ParallelEnv
 from typing_extensions import Self
 
 from di_envs.actions.checked import action_space, checked_action
+from di_envs.bulk.rows import row_of
 from di_envs.config import check_name
 from di_envs.copying import Copyable
 from di_envs.course import load_course
@@ -98,6 +99,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         self._screen = None if render_mode is None else Screen(course, render_mode)
         self.world = World(course.town, course.world_config)
         self.possible_agents = [f"ego_{ego}" for ego in range(egos)]
+        self._egos = {name: ego for ego, name in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         space = course.form.space
         self._observation_spaces = {name: copy.deepcopy(space) for name in self.possible_agents}
@@ -122,12 +124,12 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
 
     def view_of(self, agent: str) -> WorldView:
         """The present state as a privileged agent takes it that drives this ego."""
-        ego = self.possible_agents.index(self._known(agent))
+        ego = self._egos[self._known(agent)]
         return dataclasses.replace(self.view, ego=ego)
 
     def plan_of(self, agent: str) -> RoutePlan:
         """The route of an ego in this episode. RuntimeError before a reset."""
-        return self.view.plans[self.possible_agents.index(self._known(agent))]
+        return self.view.plans[self._egos[self._known(agent)]]
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -237,7 +239,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
 
     def _draw(self, agent: str, observations: Mapping[str, Observation]) -> Any:
         assert self._screen is not None
-        ego = self.possible_agents.index(agent)
+        ego = self._egos[agent]
         seen = observations.get(agent) or self._observers[ego].front()
         return self._screen.draw(self.view, ego, seen)
 
@@ -252,13 +254,19 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         ]
 
     def _shown(self, observations: Mapping[str, Observation]) -> dict[str, Any]:
-        return {name: self._course.form.of(seen) for name, seen in observations.items()}
+        """What egos see in the form that was asked for, made for all of them together."""
+        form, seen = self._course.form, list(observations.values())
+        if form.preset is None or not seen:
+            return dict(observations)
+        together = {name: np.stack([own[name] for own in seen]) for name in seen[0]}
+        shown = form.of(together)
+        return {name: row_of(shown, k) for k, name in enumerate(observations)}
 
     def _observe(self) -> dict[str, Observation]:
         return {name: self._observers[ego].observe() for name, ego in self._driving().items()}
 
     def _driving(self) -> dict[str, int]:
-        return {name: self.possible_agents.index(name) for name in self.agents}
+        return {name: self._egos[name] for name in self.agents}
 
     def _known(self, agent: str) -> str:
         check_name(agent, self.possible_agents, "agent")

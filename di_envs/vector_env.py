@@ -23,7 +23,7 @@ from typing_extensions import Self
 
 from di_envs.bulk.arguments import check_counts, checked_actions, checked_mask, checked_seeds
 from di_envs.bulk.infos import Infos, infos_of
-from di_envs.bulk.rows import WorldRows
+from di_envs.bulk.rows import WorldRows, row_of
 from di_envs.bulk.threads import Crew, cores
 from di_envs.bulk.worlds import Worlds
 from di_envs.copying import Copyable
@@ -287,9 +287,10 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
     def _restart(self, rows: Observation, infos: Infos, begun: dict[int, Info]) -> Info:
         """Resets the worlds that have ended; returns what they ended with, as Gymnasium has it."""
         batched: Info = {}
-        for index in np.flatnonzero(self._ended).tolist():
-            last = self._form.of(self._looks.row(rows, index))
-            final = {"final_obs": last, "final_info": infos.row(index)}
+        ended = np.flatnonzero(self._ended)
+        last = self._form.of({name: array[ended] for name, array in rows.items()})
+        for k, index in enumerate(ended.tolist()):
+            final = {"final_obs": row_of(last, k), "final_info": infos.row(index)}
             batched = self._add_info(batched, final, index)
         flags = self._ended.copy()
         self._crew.each(self._beginnings(np.flatnonzero(flags), rows, begun))

@@ -25,7 +25,7 @@ from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 import di_envs  # noqa: F401 (registers the ids)
 from agents.training.board import Tell, board
 from wrappers.actions import pedal_vector
-from wrappers.prompt_features import KEYS, PromptFeatures
+from wrappers.prompt_features import PromptFeatures
 from wrappers.sb3 import Sb3VecEnv
 
 FIRST_SEED = 1_000_000
@@ -46,7 +46,7 @@ class Training:
     rollout: int = 4096
     """Decisions between two updates of the networks."""
 
-    worlds: int = 16
+    worlds: int = 32
     """Driven at once, in threads."""
 
     threads: int = 2
@@ -70,11 +70,12 @@ def make_worlds(training: Training) -> VecNormalize:
         threads=training.threads,
         autoreset_mode="SameStep",
         observations=("prompt",),
+        preset="flat",
         control_dt_s=CONTROL_DT_S,
         terminate_on=ENDS,  # what an infraction costs is the rest of the route: easy to learn
         traffic=training.traffic,
     )
-    worlds = Sb3VecEnv(pedal_vector(envs), keys=KEYS)
+    worlds = Sb3VecEnv(pedal_vector(envs))
     worlds.seed(FIRST_SEED + training.seed * training.worlds)
     log = str(training.model.with_suffix(""))
     scores = ("driving_score", "route_completion", "finished")
@@ -84,7 +85,7 @@ def make_worlds(training: Training) -> VecNormalize:
 def make_learner(worlds: VecNormalize, training: Training) -> PPO:
     """PPO with small networks, that drives off rather than brakes before it has learned."""
     learner = PPO(
-        "MultiInputPolicy",
+        "MlpPolicy",
         worlds,
         n_steps=training.rollout // training.worlds,
         batch_size=512,

@@ -104,6 +104,24 @@ def test_a_model_is_trained_and_then_scored(tmp_path):
     assert record.score.route_completion > 5.0  # it is made to drive off from the start
 
 
+def test_a_policy_of_one_file_learns_what_is_to_be_gained_and_drives(tmp_path):
+    pytest.importorskip("torch", reason="needs the extra policy")
+    arguments = ("--env", "DriveInsight-Toy-v1", "--traffic", "4", "--walkers", "0")
+    arguments += ("--steps", "8192", "--worlds", "16", "--threads", "1")
+    text = printed("ppo_single_file.py", *arguments, "--folder", str(tmp_path))
+    assert "8,192 steps" in text
+    first = number(r"first update ([\d.]+)", text)
+    assert number(r"last ([\d.]+)\n", text) < 0.5 * first
+    assert number(r"episodes in training: ([\d.]+)", text) > 10.0
+    agent = re.search(r"--agent (pickled:\S+)", text)
+    assert agent
+    options = {"suite": "toy", "traffic": 4, "walkers": 0}
+    with Driver(RunSpec(agent=agent[1], options=options)) as driver:
+        record = driver.drive(Job(index=0, route_id=driver.env.route_ids[0], seed=0))
+    assert record.reason == ""
+    assert record.score.route_completion > 20.0
+
+
 @pytest.mark.full
 def test_a_policy_is_taught_from_nothing_and_set_beside_constant(tmp_path):
     pytest.importorskip("torch", reason="needs the extra policy")

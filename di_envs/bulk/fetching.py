@@ -14,14 +14,12 @@ from di_envs.world.traffic.motion import AXLE_SHARE
 from di_envs.world.traffic.tables import TrafficTables
 from di_envs.world.walkers.walk_graph import WalkGraph
 
-LANES_AHEAD = 4  # of a path, whose speeds a vehicle looks up
-
 _ABSENT, _EGOS = int(ActorKind.ABSENT), 1
 
 
 @kernel
 def fetch_traffic(state: State, lanes: Lanes, tables: TrafficTables, vehicle_end: int) -> None:
-    """The points at the axles of each vehicle, and the speeds on its way."""
+    """The points at the axles of each vehicle, and the speed where it is."""
     for actor in range(_EGOS, vehicle_end):
         lane = state.lane[actor]
         if state.kind[actor] == _ABSENT or lane < 0:
@@ -30,11 +28,6 @@ def fetch_traffic(state: State, lanes: Lanes, tables: TrafficTables, vehicle_end
         _fetch_point(lanes, lane, state.lane_m[actor] - axle_m)
         _fetch_point(lanes, lane, state.lane_m[actor] + axle_m)
         prefetch(tables.point_speed, _point(lanes, lane, state.lane_m[actor]))
-        for step in range(1, LANES_AHEAD + 1):
-            ahead = state.path[actor, step]
-            if ahead < 0:
-                break
-            prefetch(tables.point_speed, lanes.first[ahead])
 
 
 @kernel

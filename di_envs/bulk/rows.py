@@ -72,11 +72,10 @@ class WorldRows:
             rows |= prompt_observation(self._prompts)
             rows["command"] = rows["command"][:, 0]
 
-    def row(self, rows: Rows, index: int) -> Rows:
-        """One world's observation, which later writing leaves as it is."""
-        return {name: _own(array[index]) for name, array in rows.items()}
 
-
-def _own(row: Any) -> Any:
-    """A row that later writing leaves as it is."""
+def row_of(batch: Any, index: int) -> Any:
+    """One world's entry of each array, or of the only one, which later writing leaves as it is."""
+    if isinstance(batch, dict):
+        return {name: row_of(array, index) for name, array in batch.items()}
+    row = batch[index]
     return row.copy() if isinstance(row, np.ndarray) else row

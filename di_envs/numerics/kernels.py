@@ -101,6 +101,7 @@ def bind(function: Function, *arguments: Any) -> Function:
         return function
     compiled: Any = function
     signature = tuple(numba.typeof(argument) for argument in arguments)
-    compiled.compile(signature)
+    if signature not in compiled.overloads:
+        compiled.compile(signature)
     bound: Function = compiled.overloads[signature].entry_point
     return bound

@@ -8,7 +8,8 @@ World frame, SI units; stations are along the lane in its direction of travel.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,6 +166,7 @@ class Capacity(NamedTuple):
 _F8, _I8, _I4, _I1, _U8 = "f8", "i8", "i4", "i1", "u8"
 
 
+@cache
 def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
     """The record of one world; field order is that of `State`."""
     actors, egos, triggers = (capacity.actors,), (capacity.egos,), (capacity.triggers,)
@@ -230,6 +232,21 @@ def state_dtype(capacity: Capacity) -> np.dtype[np.void]:
 
 def views_of(record: NDArray[np.void]) -> State:
     """Named views into a world's record, a one-element array: they share its memory."""
+    state: Any = _views(record)
+    if record.flags.aligned:  # as all are that were made here
+        first = _first_of(record.dtype)
+        state.lie_as(first, state.seed.ctypes.data - first.seed.ctypes.data)
+    views: State = state
+    return views
+
+
+@cache
+def _first_of(layout: np.dtype[np.void]) -> State:
+    """Views into a record of a layout, after which those into all others are described."""
+    return _views(np.zeros(1, layout))
+
+
+def _views(record: NDArray[np.void]) -> State:
     return State(
         *(
             record[name][0] if record[name].ndim > 1 else record[name].reshape(())

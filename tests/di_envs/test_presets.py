@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict
-from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import FlattenObservation
 
@@ -16,7 +16,15 @@ import di_envs
 from di_envs.config import RouteEnvConfig, UnknownOptionError
 from di_envs.observation import observation_space
 from di_envs.presets import FLAT_LIMIT, Form
-from di_envs.prompt_numbers import ROUTE_SAMPLES
+from di_envs.prompt_numbers import (
+    FLAT_NUMBERS,
+    ROUTE_SAMPLES,
+    flat_numbers,
+    numbers_of,
+    prompt_numbers,
+    to_route,
+    to_route_of_arrays,
+)
 from di_envs.testing import check_environment
 from di_envs.world.kinds import ActorKind
 
@@ -78,6 +86,30 @@ def test_the_vector_is_the_prompt_by_arithmetic():
     assert not vector[266:].any()
 
 
+def test_the_vector_is_taken_apart_into_the_tables_that_it_was_made_of():
+    prompt = Form(PROMPT, "box").of(a_prompt())
+    numbers = prompt_numbers(prompt, np)
+    flat = flat_numbers(numbers, np)
+    assert flat.shape == (FLAT_NUMBERS,)
+    for name, part in numbers_of(np.stack([flat, 2.0 * flat]))._asdict().items():
+        there = getattr(numbers, f"{name}_valid", 1.0)
+        expected = getattr(numbers, name) * there
+        np.testing.assert_array_equal(part, np.stack([expected, 2.0 * expected]), err_msg=name)
+
+
+@pytest.mark.parametrize("shape", [(5,), (3, 5), (2, 3, 5)])
+def test_places_on_the_route_are_the_same_bits_by_the_kernel_as_by_whole_arrays(shape):
+    draws = np.random.default_rng(0)
+    x, y = (draws.normal(0.0, 20.0, (*shape, 2)).astype(np.float32)[..., k] for k in range(2))
+    routing = draws.normal(0.0, 20.0, (*shape[:-1], 50, 4)).astype(np.float32)
+    routing[..., 3] = draws.random((*shape[:-1], 50)) < 0.7
+    routing[..., 10, :] = routing[..., 5, :]  # as near: the first one counts
+    for by_kernel, by_arrays in zip(
+        to_route_of_arrays(x, y, routing), to_route(x, y, routing, np), strict=True
+    ):
+        np.testing.assert_array_equal(by_kernel, by_arrays)
+
+
 def test_what_else_there_is_follows_in_the_vector_each_by_its_largest():
     space = observation_space(("prompt", "odometry"))
     odometry = np.array([5e4, -1e5, np.pi], np.float32)
@@ -90,6 +122,21 @@ def test_no_number_of_a_vector_is_beyond_its_bounds():
     most = {name: np.asarray(getattr(part, "high", 1)) for name, part in PROMPT.items()}
     vector = Form(PROMPT, "flat").of({**most, "command": np.int64(6)})
     assert vector.max() == FLAT_LIMIT  # the length of a car of 100 m
+
+
+@pytest.mark.parametrize("preset", ["box", "flat"])
+def test_each_of_several_egos_is_shown_what_it_sees_itself(preset):
+    form = Form(PROMPT, preset)
+    plain, shown = (
+        di_envs.parallel_env(3, suite="toy", preset=chosen, **QUIET) for chosen in (None, preset)
+    )
+    raw, seen = plain.reset(seed=1)[0], shown.reset(seed=1)[0]
+    for throttle in (0.2, 0.9):
+        assert list(seen) == ["ego_0", "ego_1", "ego_2"]
+        for name, own in seen.items():
+            assert data_equivalence(form.of(raw[name]), own, exact=True)
+        actions = {name: np.array([throttle, 0.0, 0.0], np.float32) for name in seen}
+        raw, seen = plain.step(actions)[0], shown.step(actions)[0]
 
 
 @pytest.mark.parametrize("preset", ["box", "flat"])

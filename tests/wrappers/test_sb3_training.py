@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env import (
 )
 
 import di_envs
+from di_envs.presets import Form
 from wrappers.actions import PedalWrapper, WaypointWrapper, pedal_vector
 from wrappers.prompt_features import KEYS, PromptFeatures
 from wrappers.sb3 import Sb3VecEnv
@@ -160,6 +161,20 @@ def test_the_features_are_blind_to_the_order_of_rows_and_to_empty_ones():
     red[:, 3], green[:, 3] = 3.0, 1.0
     lit = [of({**observation, "traffic_lights": table}) for table in (red, green)]
     assert not torch.equal(*lit)
+
+
+def test_the_features_of_the_vector_are_those_of_the_prompt():
+    raw = di_envs.RouteEnv(suite="town05_tiny", observations=("prompt",))
+    seen, _ = raw.reset(seed=3)
+    boxes, flat = (Form(raw.observation_space, preset) for preset in ("box", "flat"))
+    torch.manual_seed(0)
+    of_prompt, of_vector = PromptFeatures(raw.observation_space), PromptFeatures(flat.space)
+    of_vector.load_state_dict(of_prompt.state_dict())
+    prompt = {name: torch.as_tensor(part)[None] for name, part in boxes.of(seen).items()}
+    vector = torch.as_tensor(flat.of(seen))[None]
+    torch.testing.assert_close(of_vector(vector), of_prompt(prompt))
+    with pytest.raises(ValueError, match="364 numbers"):
+        PromptFeatures(gymnasium.spaces.Box(-1.0, 1.0, (365,)))
 
 
 def test_stable_baselines_own_wrappers_take_boxes_and_vectors():

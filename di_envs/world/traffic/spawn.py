@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.numerics.arrays import Bool, Float64, Int32
+from di_envs.numerics.kernels import kernel
 from di_envs.numerics.keyed_arrays import keyed_hashes
 from di_envs.numerics.keyed_random import Stream, uniform
 from di_envs.town.lanes import Lanes
@@ -86,6 +89,13 @@ VEHICLES = (
         speed_factor=(0.4, 0.5),
     ),
 )
+# The same for kernels
+_SHARE, _LENGTH, _WIDTH, _HEIGHT, _SLOWEST, _FASTEST = range(6)
+_MODELS = np.array(
+    [(m.share, m.length_m, m.width_m, m.height_m, *m.speed_factor) for m in VEHICLES]
+)
+_KINDS = np.array([model.kind for model in VEHICLES], np.int8)
+_DRIVER_STREAM = int(Stream.TRAFFIC_DRIVER)
 
 
 class Spots(NamedTuple):
@@ -127,47 +137,67 @@ def spawn_traffic(
 
     Where the town has fewer free places, as many drive as fit, and a warning says so.
     """
-    seed = int(state.seed[()])
-    chosen = _chosen(spots, plans, seed)
+    chosen = _chosen(spots, plans, int(state.seed[()]))
     if len(chosen) < count:
         warnings.warn(
             f"expected room for {count} vehicles, but the town has {len(chosen)} free places: "
             f"{len(chosen)} drive; ask for no more to hear nothing of it",
             stacklevel=2,
         )
-    for actor, spot in enumerate(chosen[:count].tolist(), first):
-        _equip(state, actor, seed)
-        state.lane[actor] = state.path[actor, 0] = spots.lane[spot]
-        state.lane_m[actor] = spots.station_m[spot]
-        choose_path(state, lanes, tables, actor, 1)
-        place_vehicle(state, lanes, actor)
+    taken = chosen[:count]
+    _set_up(state, lanes, tables, first, spots.lane[taken], spots.station_m[taken])
 
 
 def _chosen(spots: Spots, plans: tuple[RoutePlan, ...], seed: int) -> NDArray[np.intp]:
     """The places that no ego needs, in an order drawn from the seed."""
-    free = np.ones(len(spots.lane), bool)
+    free = np.ones(len(spots.lane), np.bool_)
     for plan in plans:
         near = plan.points[plan.route_m <= ROUTE_CLEARANCE_M, :3]
-        for k, point in enumerate(near):
-            reach = EGO_CLEARANCE_M if k == 0 else 0.5 * SPOT_SPACING_M
-            free &= np.linalg.norm(spots.place - point, axis=1) > reach
+        x, y, z = np.ascontiguousarray(spots.place.T)
+        _keep_free(free, x, y, z, near)
     drawn = keyed_hashes(seed, int(Stream.TRAFFIC_SPAWN), 0, free.size)
     chosen = np.flatnonzero(free)
     return chosen[np.argsort(drawn[chosen], kind="stable")]
 
 
-def _equip(state: State, actor: int, seed: int) -> None:
+@kernel
+def _keep_free(free: Bool, x: Float64, y: Float64, z: Float64, route: Float64) -> None:
+    """Strikes out places (K,) near the first points (R, 3) of an ego's route."""
+    for k in range(route.shape[0]):
+        reach = EGO_CLEARANCE_M if k == 0 else 0.5 * SPOT_SPACING_M
+        for spot in range(free.size):
+            dx, dy, dz = x[spot] - route[k, 0], y[spot] - route[k, 1], z[spot] - route[k, 2]
+            free[spot] &= math.sqrt(dx * dx + dy * dy + dz * dz) > reach
+
+
+@kernel
+def _set_up(
+    state: State, lanes: Lanes, tables: TrafficTables, first: int, lane: Int32, station_m: Float64
+) -> None:
+    """Puts a vehicle at each of some places, (C,) lanes and stations, in the slots from `first`."""
+    for k in range(lane.size):
+        actor = first + k
+        _equip(state, actor)
+        state.lane[actor] = lane[k]
+        state.path[actor, 0] = lane[k]
+        state.lane_m[actor] = station_m[k]
+        choose_path(state, lanes, tables, actor, 1)
+        place_vehicle(state, lanes, actor)
+
+
+@kernel
+def _equip(state: State, actor: int) -> None:
     """Draws what a vehicle is and how fast its driver likes to go."""
-    stream = int(Stream.TRAFFIC_DRIVER)
-    draw, model = uniform(seed, stream, 0, actor), VEHICLES[-1]
-    for candidate in VEHICLES:
-        if draw < candidate.share:
+    seed, model = int(state.seed[()]), _MODELS.shape[0] - 1
+    draw = uniform(seed, _DRIVER_STREAM, 0, actor)
+    for candidate in range(_MODELS.shape[0]):
+        if draw < _MODELS[candidate, _SHARE]:
             model = candidate
             break
-        draw -= candidate.share
-    low, high = model.speed_factor
-    state.kind[actor] = model.kind
-    state.half_length[actor] = model.length_m / 2.0
-    state.half_width[actor] = model.width_m / 2.0
-    state.height[actor] = model.height_m
-    state.desired_factor[actor] = low + (high - low) * uniform(seed, stream, 1, actor)
+        draw -= _MODELS[candidate, _SHARE]
+    state.kind[actor] = _KINDS[model]
+    state.half_length[actor] = _MODELS[model, _LENGTH] / 2.0
+    state.half_width[actor] = _MODELS[model, _WIDTH] / 2.0
+    state.height[actor] = _MODELS[model, _HEIGHT]
+    low, high = _MODELS[model, _SLOWEST], _MODELS[model, _FASTEST]
+    state.desired_factor[actor] = low + (high - low) * uniform(seed, _DRIVER_STREAM, 1, actor)

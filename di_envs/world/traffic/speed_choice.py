@@ -119,7 +119,7 @@ def allowed_speed(state: State, lanes: Lanes, tables: TrafficTables, actor: int)
         ahead = state.path[actor, step]
         if ahead < 0 or distance > 80.0:
             break
-        there = tables.point_speed[lanes.first[ahead]]
+        there = tables.first_speed[ahead]
         least = min(least, there * there + 2.0 * SLOWING_MPS2 * max(distance, 0.0))
         distance += lanes.length_m[ahead]
     speed = min(speed, math.sqrt(least))  # one root: that of the least is the least of the roots

@@ -25,6 +25,7 @@ class TrafficTables(NamedTuple):
     """Arrays over the lanes L, points P and crosswalks X of a town."""
 
     point_speed: NDArray[np.float64]  # (P,) speed limit, bends and slowing for them included [m/s]
+    first_speed: NDArray[np.float64]  # (L,) of these, that at each lane's first point
     usable: NDArray[np.int8]  # (L,) 1 where traffic can drive on for ever, or to an open end
     # where vehicles come into the town (N,), those that have left it by an open end
     entry_lane: NDArray[np.int32]
@@ -46,8 +47,10 @@ def traffic_tables(town: Town) -> TrafficTables:
     crossings = _crossings(town)
     usable = _usable_lanes(town)
     entries = _entries(town, usable)
+    speeds = _point_speeds(town)
     return TrafficTables(
-        point_speed=_point_speeds(town),
+        point_speed=speeds,
+        first_speed=speeds[town.lanes.first],
         usable=usable,
         entry_lane=entries[0],
         entry_pose=entries[1],

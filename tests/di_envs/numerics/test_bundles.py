@@ -11,7 +11,7 @@ import pytest
 
 from di_envs.numerics.bundles import by_reference
 from di_envs.town.loading import load_town
-from di_envs.world.state import Capacity, state_dtype, views_of
+from di_envs.world.state import Capacity, State, state_dtype, views_of
 
 
 @by_reference
@@ -127,6 +127,36 @@ def test_read_only_views_and_other_shapes_compile_nothing_new():
     assert weighted(make_outer(matrix=frozen), 1) == 31.75
     weighted(make_outer(matrix=np.ones((50, 3)), index=np.zeros(7, np.int32)), 1)
     assert len(weighted.signatures) == compiled
+
+
+def test_bundles_that_are_alike_share_one_type_and_others_have_their_own():
+    first, again = make_outer(), make_outer(index=np.zeros(9, np.int32), count=7)
+    assert first.bundle_type is again.bundle_type
+    assert numba.typeof(first) is first.bundle_type
+    turned = np.asfortranarray(np.ones((2, 3)))
+    wide = np.ones((4, 6))[::2, ::2]
+    packed = np.zeros(2, [("flag", "i1"), ("value", "f8")])["value"]  # not aligned
+    changes = ({"matrix": turned}, {"matrix": wide}, {"scalar": np.array(1.0)}, {"count": 1.0})
+    inner = Inner(values=packed, factor=2.0)
+    kinds = [make_outer(**change).bundle_type for change in (*changes, {"inner": inner})]
+    assert len({first.bundle_type, *kinds}) == 6
+
+
+def test_what_describes_a_bundle_serves_for_arrays_so_many_bytes_behind():
+    values = np.array([[1.0, 2.0], [30.0, 40.0]])
+    first, second = (Inner(values=row, factor=2.0) for row in values)
+    second.lie_as(first, values.strides[0])
+    assert add_up(second) == 140.0
+    assert add_up(first) == 6.0
+
+
+def test_a_state_is_described_as_if_each_of_its_arrays_had_been_looked_at():
+    capacity = Capacity(egos=1, vehicles=2, walkers=1, props=1, junctions=1, signals=1)
+    rows = np.zeros(3, state_dtype(capacity))
+    for state in (views_of(rows[:1]), views_of(rows[2:]), views_of(rows[1:2].copy())):
+        looked_at = State(*state)
+        assert np.array_equal(state.bundle_block, looked_at.bundle_block)
+        assert state.bundle_type is looked_at.bundle_type
 
 
 def test_another_element_type_is_another_signature_not_a_misreading():
