@@ -101,6 +101,7 @@ def test_the_bits_are_those_of_this_process_though_a_machine_is_lost(tmp_path):
     from ray.cluster_utils import Cluster
 
     spec = RunSpec(agent="constant", options=OPTIONS)
+    handler = signal.getsignal(signal.SIGTERM)  # a machine made here puts its own in its place
     machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
     try:
         engine = LosesItsMachine(machines, machines.add_node(num_cpus=1))
@@ -108,6 +109,7 @@ def test_the_bits_are_those_of_this_process_though_a_machine_is_lost(tmp_path):
         run = evaluated(spec, [0, 1, 2, 3], tmp_path / "run", said, engine)
     finally:
         machines.shutdown()
+        signal.signal(signal.SIGTERM, handler)
     assert "Failed - Worker died, tried again: the Ray worker is gone" in said.getvalue()
     assert run.complete
     with Driver(spec) as driver:
