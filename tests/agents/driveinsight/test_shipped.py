@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from agents import AGENTS, AgentSpecError, load_agent
@@ -16,8 +14,6 @@ from leaderboard.running.jobs import Job, RunSpec
 
 NAMES = [name for name, entry in AGENTS.items() if entry.data.startswith("driveinsight/weights/")]
 MOST_BYTES = 4_000_000
-# Trained before there was a token for what comes next along the route
-BEFORE_NEXT_ROW = ("driveinsight", "driveinsight-told")
 TRAINED_AS = {"driveinsight-town05": "driveinsight"}  # of other drives
 
 
@@ -42,9 +38,6 @@ def test_a_policy_that_does_not_come_with_the_package_says_what_to_do():
 
 def test_shipped_weights_are_small_and_of_the_configuration_of_their_name(shipped):
     config = config_named(TRAINED_AS.get(shipped, shipped))
-    if shipped in BEFORE_NEXT_ROW:
-        planner = dataclasses.replace(config.planner, next_row=False)
-        config = dataclasses.replace(config, planner=planner)
     assert from_pretrained(SHIPPED / shipped).config == config
     assert (SHIPPED / shipped / WEIGHTS_FILE).stat().st_size <= MOST_BYTES
 
