@@ -193,6 +193,10 @@ def main() -> None:
         "--towns", nargs="+", type=int, default=TOWNS, metavar="N", help="in one map (default: all)"
     )
     arguments = parser.parse_args()
+    if arguments.rounds < 1:
+        parser.error(f"--rounds must be at least 1, not {arguments.rounds}")
+    if min(arguments.towns) < 1:
+        parser.error(f"--towns must be at least 1 each, not {min(arguments.towns)}")
     console = Console(stderr=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from di_envs.suites import load_suite
+from di_envs.suites import load_suite, suite_names
 from leaderboard.records.record import RunRecord
 from leaderboard.running.jobs import RunSpec
 from leaderboard.running.messages import Driven, EngineEvent
@@ -84,10 +84,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--agent", default="expert", help="default: expert")
-    parser.add_argument("--suite", default="town05_tiny", help="default: town05_tiny")
+    parser.add_argument(
+        "--suite", choices=suite_names(), default="town05_tiny", help="default: town05_tiny"
+    )
     parser.add_argument("--seeds", type=int, default=1, help="default: 1")
     parser.add_argument("--workers", nargs="+", type=int, default=(1, 2, 4), metavar="N")
     arguments = parser.parse_args()
+    if min(arguments.seeds, *arguments.workers) < 1:
+        parser.error("--seeds and --workers must be at least 1")
     spec = RunSpec(agent=arguments.agent, options={"suite": arguments.suite})
     console = Console(stderr=True)
     engines: dict[str, Engine] = {"this machine, 1": LocalEngine(workers=1)}
