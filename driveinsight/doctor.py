@@ -164,7 +164,7 @@ def _ffmpeg() -> Iterator[Finding]:
 
 
 def _route() -> Iterator[Finding]:
-    """Drives one, as any evaluation does; the first time it compiles for a minute."""
+    """Drives one, as any evaluation does; the first time it compiles for half a minute."""
     from di_envs.suites import load_suite
     from leaderboard.running.driver import Driver
     from leaderboard.running.jobs import Job, RunSpec

@@ -12,7 +12,7 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,12 +25,14 @@ import numba
 
 from di_envs.files.caches import cache_folders
 from di_envs.numerics.code_cache import CodeCache
+from di_envs.numerics.dispatcher import KernelDispatcher
+from di_envs.numerics.together import Part
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PART = "kernels"  # of the caches
-# What only says where code is kept, not what it does
-_KEEPING = ("di_envs.files.caches", "di_envs.numerics.code_cache")
+# What only says where code is kept and who compiles it, not what it does
+_KEEPING = ("di_envs.files.caches", "di_envs.numerics.code_cache", "di_envs.numerics.together")
 _IMPORT = re.compile(rb"^from ((?:di_envs|agents)[.\w]*) import", re.MULTILINE)
 
 
@@ -83,12 +85,42 @@ def kernel_cache() -> Path:
 
 def kernel(function: Function) -> Function:
     """Compiles `function` without the Python interpreter, releasing the GIL, never `fastmath`."""
-    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
-    if not numba.config.DISABLE_JIT:
-        part = f"{_PART}/{sources_digest(function.__module__)}"
-        compiled._cache = CodeCache(function, part)  # as Numba's own `enable_caching` sets it
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled: Any = KernelDispatcher(function)
+    part = f"{_PART}/{sources_digest(function.__module__)}"
+    compiled.keep_in(CodeCache(function, part), CodeCache(function, f"{part}/within"))
     kernel: Function = compiled
     return kernel
+
+
+def made_of(parts: Callable[..., Iterable[Part]]) -> Callable[[Function], Function]:
+    """Says which large kernels one calls, so that two processes can compile them.
+
+    Args:
+        parts: Of the types of its arguments, kernels and the types of theirs. What is left out or
+            wrong costs time alone.
+    """
+
+    def add(function: Function) -> Function:
+        kernel: Any = function
+        if not numba.config.DISABLE_JIT:
+            kernel.parts = parts
+        return function
+
+    return add
+
+
+def prepare(function: Callable[..., Any], arguments: Callable[[], tuple[Any, ...]]) -> None:
+    """Has another process begin to compile what a kernel is made of, if it has never been called.
+
+    Args:
+        function: The kernel, which is said to be `made_of` others.
+        arguments: Gives arguments as it will be called with.
+    """
+    kernel: Any = function
+    if not numba.config.DISABLE_JIT and not kernel.overloads:
+        kernel.prepare(tuple(map(numba.typeof, arguments())))
 
 
 def bind(function: Function, *arguments: Any) -> Function:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.numerics.arrays import Float64
 from di_envs.numerics.bundles import by_reference
-from di_envs.numerics.kernels import kernel
+from di_envs.numerics.kernels import kernel, made_of
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.world.contact import resolve_contacts
 from di_envs.world.dynamics import EgoParameters, locate_ego, move_ego
@@ -64,6 +64,25 @@ class Scratch(NamedTuple):
     below: NDArray[np.int32]  # (OCCUPIED_LANES,)
 
 
+def _parts_of_advance(
+    state: Any, scenery: Any, scratch: Any, *counts_and_out: Any
+) -> list[tuple[Any, tuple[Any, ...]]]:
+    """What takes longest to compile of `advance`, by types, the longest first."""
+    *_, count, out = counts_and_out
+    lanes, signals, routes = (scenery.types[name] for name in ("lanes", "signals", "routes"))
+    walk, scenarios = scenery.types["walk"], scenery.types["scenarios"]
+    return [
+        (_move_traffic, (state, scenery, scratch, count, count)),
+        (move_walkers, (state, walk, signals, scratch.types["neighbours"], count, count)),
+        (detect_events, (state, lanes, signals, routes, count, count, out, count)),
+        (watch_scenarios, (state, scenarios, signals, routes, count, out, count)),
+        (locate_ego, (state, lanes, count)),
+        (resolve_contacts, (state, out, count)),
+        (move_scenarios, (state, scenarios, signals, count, count)),
+    ]
+
+
+@made_of(_parts_of_advance)
 @kernel
 def advance(
     state: State,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.kernels import bind
+from di_envs.numerics.kernels import bind, prepare
 from di_envs.town.lanes import LightState
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
@@ -133,6 +133,7 @@ class World:
             plans: One route an ego; none for a world of traffic alone.
         """
         self._allocate(tuple(plans))
+        prepare(advance, self._arguments)
         view, spots = self.view, self._tables.spots
         begin_episode(self._state, seed, self._scenery, spots, view.capacity, view.plans)
 
@@ -270,18 +271,21 @@ class World:
 
     def _bind(self) -> None:
         """Makes what only `run` needs: worlds that a vector environment steps have none of it."""
+        arguments = self._arguments()
+        self._scratch, self._event_rows = arguments[2], arguments[-1]
+        self._advance = bind(advance, *arguments)
+
+    def _arguments(self) -> tuple[Any, ...]:
+        """Arguments of `advance`, with working memory made for them."""
         capacity = self.view.capacity
-        self._scratch = make_scratch(self.town, capacity)
-        self._event_rows = np.zeros((ROWS_PER_EGO * capacity.egos * BATCH_TICKS, COLUMNS))
-        self._advance = bind(
-            advance,
+        return (
             self._state,
             self._scenery,
-            self._scratch,
+            make_scratch(self.town, capacity),
             self._vehicle_end,
             self._walker_end,
             BATCH_TICKS,
-            self._event_rows,
+            np.zeros((ROWS_PER_EGO * capacity.egos * BATCH_TICKS, COLUMNS)),
         )
 
 

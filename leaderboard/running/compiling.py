@@ -1,4 +1,4 @@
-"""Tells of kernels as they are compiled, which takes a minute on the first run of a version."""
+"""Tells of kernels as they are compiled, as the first run of a version does."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Compiles what a drive needs before it begins: a few steps of its route touch every kernel.
 
-The first run of a version on a kind of CPU compiles for a minute; later ones load machine code from
-the cache.
+The first run of a version on a kind of CPU compiles for half a minute; later ones load machine code
+from the cache.
 """
 
 from __future__ import annotations

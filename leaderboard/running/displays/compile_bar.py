@@ -6,7 +6,7 @@ from rich.progress import Progress
 
 from leaderboard.running.messages import Compiling
 
-COMPILING = "Compiling kernels, once for this version and CPU (a minute or so)"
+COMPILING = "Compiling kernels, once for this version and CPU (half a minute or so)"
 
 
 class CompileBar:
