@@ -13,10 +13,9 @@ from agents.training.config import TrainConfig
 from agents.zoo.system import MOMENT_DT_S, SystemConfig
 
 _LIMITS = """\
-It has seen made-up towns of this simulator only, with its own pictures of them, driven by the
-expert of this project; it knows no real road. Of its prompt the map, obstacles, lights and signs
-are the simulator's truth, which no real car has. It is made for research on why such policies act
-as they do, not for driving."""
+It has seen no town but those under Data, in this simulator's own pictures; it knows no real road.
+What it is told of the map, obstacles, lights and signs is the simulator's truth, which no real car
+has. It is made for research on why such policies act as they do, not for driving."""
 
 
 def about_policy(network: nn.Module, config: PolicyConfig) -> tuple[str, ...]:

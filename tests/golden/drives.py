@@ -124,6 +124,15 @@ GOLDEN: dict[str, GoldenDrive] = {
     "driveinsight-told on town05_short": GoldenDrive(
         agent="driveinsight-told", suite="town05_short", route="8", seconds=3.0
     ),
+    "driveinsight-sensors on town05_short": GoldenDrive(
+        agent="driveinsight-sensors", suite="town05_short", route="8", seconds=2.0
+    ),
+    "driveinsight-town05 on town05_short": GoldenDrive(
+        agent="driveinsight-town05", suite="town05_short", route="8", seconds=2.0
+    ),
+    "route-only on town05_short": GoldenDrive(
+        agent="route-only", suite="town05_short", route="8", seconds=3.0
+    ),
     "every sensor in rain": GoldenDrive(
         agent="expert", suite="town05_short", route="0", seconds=2.0, shown=EVERY_SENSOR
     ),
