@@ -23,9 +23,14 @@ from numba.core import event as numba_event
 Part = tuple[Any, tuple[Any, ...]]  # a kernel, and Numba's types that a kernel calls it with
 
 _EVENT = "numba:compile"
-_HELP = (
-    "import di_envs.numerics.kernels; from di_envs.numerics.together import help_out; help_out()"
-)
+# It finds modules where this process does. Kernels say how Numba loads, so they come first.
+_HELP = """
+import sys
+sys.path[:] = sys.argv[1:]
+import di_envs.numerics.kernels
+from di_envs.numerics.together import help_out
+help_out()
+"""
 
 
 class Together:
@@ -92,7 +97,7 @@ def _helper() -> subprocess.Popen[bytes] | None:
         return None
     try:
         return subprocess.Popen(
-            [sys.executable, "-c", _HELP],
+            [sys.executable, "-c", _HELP, *sys.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
