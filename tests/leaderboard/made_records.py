@@ -58,3 +58,19 @@ def run_of(*routes: RouteRecord, planned: int | None = None, **fields: object) -
         **fields,
     }
     return RunRecord(planned=planned or len(routes), routes=routes, **values)  # type: ignore[arg-type]
+
+
+def lost(status: str) -> RouteRecord:
+    """A route that says nothing of the driving."""
+    score = Score(route_completion=0.0, infraction_score=1.0)
+    reason = "the worker was killed by SIGKILL"
+    return route("8", index=1, status=status, reason=reason, score=score, done_m=0.0)
+
+
+# Half done, through a red light and too late
+RED = route(
+    score=Score(route_completion=50.0, infraction_score=0.7),
+    status="Failed - Agent timed out",
+    done_m=500.0,
+    events=(event(EventKind.RED_LIGHT, other=3), event(EventKind.TIMEOUT)),
+)
