@@ -38,11 +38,14 @@ class Targets:
         waypoints: (B, T, 2) [m].
         valid: (B, T) 0 or 1: where the drive went on that long.
         semantics: (B, X, Y) `BevClass`; None where there is none.
+        stands_for: (B, 3) 0 or 1: what the expert stands for, see `agents.training.standing`; None
+            where it is not known.
     """
 
     waypoints: Tensor
     valid: Tensor
     semantics: Tensor | None = None
+    stands_for: Tensor | None = None
 
 
 def losses(output: Output, targets: Targets, config: LossConfig) -> dict[str, Tensor]:

@@ -28,6 +28,7 @@ from agents.training.interest import draw_weights
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
+from agents.training.standing import stands_for
 from agents.training.turned_red import told_red, turned_red
 from agents.training.variation import Variation
 from agents.training.waiting import among_others, of_the_one_before
@@ -170,7 +171,11 @@ class PlanningSamples:
             seen=Seen(objects=_tensor(objects[share]), signals=_tensor(signals[share])),
         )
         waypoints = moved.places(moments["waypoints"]) * valid[..., None]
-        targets = Targets(waypoints=_tensor(waypoints[share]), valid=_tensor(_whole(valid[share])))
+        targets = Targets(
+            waypoints=_tensor(waypoints[share]),
+            valid=_tensor(_whole(valid[share])),
+            stands_for=_tensor(stands_for(moments, valid)[share].astype(np.float32)),
+        )
         return Batch(
             inputs=(inputs,), targets=targets, begun=torch.ones(1, share.stop - share.start)
         )

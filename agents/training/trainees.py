@@ -17,8 +17,8 @@ from torch import Tensor, nn
 
 from agents.base import Requirements
 from agents.driveinsight.agent import requirements_of
-from agents.driveinsight.config import CONFIGS, TOKENS, PolicyConfig
-from agents.driveinsight.losses import counts, losses
+from agents.driveinsight.config import BEV, CONFIGS, TOKENS, PolicyConfig
+from agents.driveinsight.losses import Targets, counts, losses
 from agents.driveinsight.model import Policy
 from agents.driveinsight.weights import save_pretrained
 from agents.networks.weights import take_tensors
@@ -34,6 +34,7 @@ from agents.training.samples import (
     hidden_components,
     without,
 )
+from agents.training.standing import FOR
 from agents.zoo.inputs import inputs_of
 from agents.zoo.registry import config_from, config_of, network_of, system_names
 from agents.zoo.system import Output, SystemConfig, SystemModel
@@ -146,7 +147,24 @@ class PaperTrainee(Trainee):
         given = torch.ones(size, len(TOKENS))
         if not training.overfit:
             given = hidden_components(self.config, size, key)
-        return self._terms(network, batch, training, given[share])
+        learnt = dataclasses.replace(batch, targets=self._known(batch.targets, given[share]))
+        return self._terms(network, learnt, training, given[share])
+
+    def _known(self, targets: Targets, given: Tensor) -> Targets:
+        """Without those who stand for what is hidden here; see `standing`."""
+        if targets.stands_for is None:
+            return targets
+        told = given * torch.tensor([float(name in self._has) for name in TOKENS])
+        columns = [TOKENS.index(name) for name in FOR]
+        hidden = (targets.stands_for * (1.0 - told[:, columns])).amax(dim=1)
+        unknown = hidden * (1.0 - told[:, TOKENS.index(BEV)])
+        return dataclasses.replace(targets, valid=targets.valid * (1.0 - unknown)[:, None])
+
+    @property
+    def _has(self) -> tuple[str, ...]:
+        """What it is told, and whether it sees."""
+        sees = self.config.camera is not None or self.config.lidar is not None
+        return (*self.config.prompt, *([BEV] if sees else []))
 
     def measured(
         self, network: nn.Module, batch: Batch, training: TrainConfig, hidden: str
