@@ -1,4 +1,4 @@
-"""Tells of kernels as they are compiled, as the first run of a version does."""
+"""Tells of kernels as they are compiled: by the first run of a version, for half a minute."""
 
 from __future__ import annotations
 
