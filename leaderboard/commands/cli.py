@@ -11,6 +11,7 @@ import functools
 import operator
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any, get_args
@@ -115,8 +116,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(given: Sequence[str]) -> int:
     """One command, and its exit code."""
-    if empty := _empty(given):
-        complain(empty)
+    if wrong := _empty(given) or _twice(given):
+        complain(wrong)
         return EXIT_USAGE
     commands: Any = Command if given and not given[0].startswith("-") else _briefly(Command)
     command: Command = tyro.cli(commands, prog="driveinsight", description=HELP, args=given)
@@ -141,6 +142,16 @@ def _empty(given: Sequence[str]) -> str:
                 f"an argument{after} is empty, as of a shell variable that is not set: give a value"
                 ", or leave it out"
             )
+    return ""
+
+
+def _twice(given: Sequence[str]) -> str:
+    """What to say of an option that is given twice, of which the last alone would count."""
+    options = [argument.partition("=")[0] for argument in given if argument.startswith("--")]
+    for option, times in Counter(name.replace("_", "-") for name in options).items():
+        if times > 1:
+            several = ', such as "drop:obstacles; drop:bev"' if option == "--intervene" else ""
+            return f"{option} is given {times} times: give it once, with all of it{several}"
     return ""
 
 

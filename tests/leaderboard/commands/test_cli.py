@@ -44,6 +44,15 @@ def test_the_list_of_commands_has_a_line_or_two_for_each(capsys):
     assert "Examples" not in listed
 
 
+def test_an_option_that_is_given_twice_is_refused_since_one_would_be_lost(capsys):
+    edits = ["--intervene", "drop:obstacles", "--intervene=drop:bev"]
+    line = refused(["evaluate", "--agent", "constant", *QUIET, *edits], capsys)
+    assert "--intervene is given 2 times" in line
+    assert '"drop:obstacles; drop:bev"' in line
+    line = refused(["evaluate", "--agent", "constant", *QUIET, "--route_ids", "1"], capsys)
+    assert "--route-ids is given 2 times" in line
+
+
 def test_the_list_of_suites_is_complete_and_says_what_is_next(capsys):
     assert main(["suites"]) == 0
     shown = capsys.readouterr().out

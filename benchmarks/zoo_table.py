@@ -1,0 +1,196 @@
+"""The zoo in one table, beside what the paper's Table 1 says, and how alike the two orders are.
+
+    driveinsight evaluate --agent transfuser --suite town05_short --seeds 3 --output t-short
+    driveinsight evaluate --agent transfuser --suite town05_long --seeds 1 --output t-long
+    ...
+    python benchmarks/zoo_table.py t-short t-long ...
+
+Give the folders of all systems together. SR is the share of drives that were completed without an
+infraction. Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
+Spearman's correlation is of the mean DS with the paper's, over the systems that both have; its
+intervals say how far it could have come out otherwise with other routes (95 %, bootstrap over
+routes, all systems on the same ones) and with other systems (95 %, Fieller, Hartley, Pearson: Tests
+for Rank Correlation Coefficients, Biometrika 1957).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from agents.zoo.registry import system_names
+from benchmarks.zoo import cost_ms
+from di_envs.rules import rules_named
+from leaderboard.records.record import RouteRecord, RunRecord
+from leaderboard.records.results import ResultsError, read_run
+from leaderboard.statistics.bootstrap import TAIL, expanded_interval, resampled_means
+from leaderboard.statistics.confidence import mean_interval
+from leaderboard.statistics.rank_correlation import spearman
+from leaderboard.tables.run_tables import driving_interval, scored_per_km, seed_means
+
+SUITES = ("town05_short", "town05_long")
+DRAWS = 2000  # of the routes, for the correlation's interval
+NORMAL_95 = 1.96
+COLUMNS = "DS|RC|IS|SR|a km"
+HEADER = (
+    f"| system |{' |'.join(f' {name}' for name in COLUMNS.split('|'))} "
+    f"|{' |'.join(f' {name}' for name in COLUMNS.split('|'))} "
+    "| parameters | ms | paper Short | paper Long | Town05 in its training |"
+)
+
+
+@dataclass(frozen=True)
+class Published:
+    """A row of the paper's Table 1: DS and RC, and what is known of its training."""
+
+    short: tuple[float, float] | None
+    long: tuple[float, float]
+    town05: str
+
+    def ds(self, suite: str) -> float | None:
+        """Its DS on a suite of ours; None if it has none."""
+        found = self.short if suite == SUITES[0] else self.long
+        return None if found is None else found[0]
+
+
+TABLE_1 = {
+    "lbc": Published((31.0, 55.0), (12.3, 31.9), "not said"),
+    "transfuser": Published((54.5, 78.4), (31.0, 47.5), "no"),
+    "st-p3": Published((55.1, 86.7), (11.5, 83.2), "not said"),
+    "vad": Published((64.3, 87.3), (30.3, 75.2), "not said"),
+    "mile": Published(None, (61.1, 97.4), "no"),
+    "thinktwice": Published(None, (70.9, 95.5), "yes (65.0 without)"),
+    "interfuser": Published((94.9, 95.2), (68.3, 95.0), "no"),
+    "driveadapter": Published(None, (71.9, 97.3), "yes (61.7 without)"),
+    "driveinsight": Published((93.2, 95.8), (64.4, 100.0), "no"),
+    "driveinsight-town05": Published((95.3, 99.2), (66.6, 100.0), "yes"),
+}
+TWICE = "driveinsight"  # in the paper's order too, but with Town05 in training: compared once
+
+
+def success_rate(run: RunRecord) -> float:
+    """The share of drives that were completed with no infraction that lowers the score, in %."""
+    scored = rules_named(run.rules).scored
+
+    def whole(record: RouteRecord) -> bool:
+        events = any(event.kind in scored for event in record.events)
+        return record.score.route_completion >= 100.0 and not events
+
+    return 100.0 * sum(map(whole, run.routes)) / len(run.routes)
+
+
+def _cells(run: RunRecord | None) -> list[str]:
+    if run is None:
+        return ["-"] * len(COLUMNS.split("|"))
+    means = {
+        name: mean_interval(seed_means(run.routes, name, run.seeds)).mean
+        for name in ("route_completion", "infraction_score")
+    }
+    return [
+        str(driving_interval(run)) + ("" if run.complete else " (not complete)"),
+        f"{means['route_completion']:.1f}",
+        f"{means['infraction_score']:.2f}",
+        f"{success_rate(run):.0f}",
+        f"{scored_per_km(run.routes, run):.2f}",
+    ]
+
+
+def _row(name: str, runs: Mapping[str, RunRecord], systems: Sequence[str]) -> str:
+    cost = ["-", "-"]
+    if name in systems:
+        size, milliseconds = cost_ms(name)
+        cost = [f"{size:,}", f"{milliseconds:.0f}"]
+    paper = TABLE_1.get(name)
+    theirs = ["-", "-", "-"]
+    if paper is not None:
+        pairs = (paper.short, paper.long)
+        theirs = ["-" if pair is None else f"{pair[0]} / {pair[1]}" for pair in pairs]
+        theirs.append(paper.town05)
+    cells = [cell for suite in SUITES for cell in _cells(runs.get(suite))]
+    return f"| {' | '.join([f'`{name}`', *cells, *cost, *theirs])} |"
+
+
+def rank_line(suite: str, found: Mapping[str, Mapping[str, RunRecord]]) -> str:
+    """How alike our order and the paper's are on a suite."""
+    pairs = {
+        name: (runs[suite], paper.ds(suite))
+        for name, runs in found.items()
+        if suite in runs and name != TWICE and (paper := TABLE_1.get(name)) is not None
+    }
+    known = {name: (run, ds) for name, (run, ds) in pairs.items() if ds is not None}
+    theirs = [ds for _, ds in known.values()]
+    ours = [driving_interval(run).mean for run, _ in known.values()]
+    rho = spearman(ours, theirs)
+    if rho is None:
+        return f"`{suite}`: {len(known)} systems are in both: too few for a correlation."
+    return (
+        f"`{suite}`: Spearman's {rho:+.2f} over {len(known)} systems ({', '.join(known)}); "
+        f"with other routes {_over_routes([run for run, _ in known.values()], theirs)}, "
+        f"with other systems {_over_systems(rho, len(known))}."
+    )
+
+
+def _over_routes(runs: Sequence[RunRecord], theirs: Sequence[float]) -> str:
+    """The interval over routes, of which all runs have the same."""
+    means = [
+        resampled_means(
+            [record.score.driving_score for record in run.routes],
+            [record.route_id for record in run.routes],
+            DRAWS,
+        )
+        for run in runs
+    ]
+    routes = {tuple(sorted({record.route_id for record in run.routes})) for run in runs}
+    if len(routes) != 1 or any(each is None for each in means):
+        return "not known: the runs are not of the same routes"
+    drawn = np.stack(means, axis=1)  # type: ignore[arg-type]
+    found = [spearman(list(row), theirs) for row in drawn]
+    known = np.array([each for each in found if each is not None])
+    low, high = expanded_interval(known, len(next(iter(routes))), TAIL)
+    return f"{low:+.2f} … {high:+.2f}"
+
+
+def _over_systems(rho: float, count: int) -> str:
+    if count < 5 or abs(rho) == 1.0:
+        return "not known: too few"
+    spread = NORMAL_95 * math.sqrt(1.06 / (count - 3))
+    low, high = (math.tanh(math.atanh(rho) + side * spread) for side in (-1.0, 1.0))
+    return f"{low:+.2f} … {high:+.2f}"
+
+
+def main() -> None:
+    """Prints the table, the highest DS on Long first, and a line on each suite's order."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folders", nargs="+", type=Path, help="folders of finished runs")
+    found: dict[str, dict[str, RunRecord]] = {}
+    try:
+        for run in map(read_run, parser.parse_args().folders):
+            if run.suite not in SUITES:
+                parser.error(f"a run on {run.suite}: expected {' or '.join(SUITES)}")
+            if run.suite in found.setdefault(run.agent, {}):
+                parser.error(f"two runs of {run.agent} on {run.suite}: give one")
+            found[run.agent][run.suite] = run
+    except ResultsError as error:
+        parser.error(str(error))
+
+    def rank(name: str) -> tuple[float, ...]:
+        runs = found[name]
+        return tuple(-driving_interval(runs[s]).mean if s in runs else 0.0 for s in SUITES[::-1])
+
+    systems = system_names()
+    print(HEADER)
+    print(f"|---|{'---:|' * (HEADER.count('|') - 3)}---|")
+    for name in sorted(found, key=rank):
+        print(_row(name, found[name], systems), flush=True)
+    print(*("\n" + rank_line(suite, found) for suite in SUITES), sep="")
+
+
+if __name__ == "__main__":
+    main()
