@@ -13,8 +13,8 @@ from agents.training.interest import line_m
 from di_envs.town.lanes import LightState
 
 FOR = ("obstacles", "traffic_lights", "stop_signs")  # what one stands for
-_STANDS_MPS, _STAYS_M = 0.3, 0.3
-_SOON = 2  # waypoints within which who stays has not gone
+_STANDS_MPS = 0.3
+_SOON, _STAYS_M = 2, 0.9  # waypoints within which who stays has not gone; who starts now goes 1.2 m
 _NEAR_M = 8.0  # from the ego's middle to a line that it waits at
 
 
