@@ -15,6 +15,8 @@ def test_each_of_obstacles_and_bev_is_hidden_alone_together_and_not_at_all_often
     for one in (True, False):
         for other in (True, False):
             assert ((obstacles == one) & (bev == other)).mean() > 0.05
+    lights = given[:, TOKENS.index("traffic_lights")]
+    assert (lights & ~obstacles & ~bev).mean() > 0.05  # told to go, and nothing of who stands there
     told = [TOKENS.index(n) for n in ("map", "obstacles", "traffic_lights", "stop_signs")]
     assert (~given[:, told]).all(axis=1).mean() == pytest.approx(0.5, abs=0.05)
 
