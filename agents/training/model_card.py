@@ -25,8 +25,8 @@ def about_policy(network: nn.Module, config: PolicyConfig) -> tuple[str, ...]:
         f"{_size(network):,} parameters; reads {', '.join(config.observations)}; prompt components "
         f"{', '.join(config.prompt) or 'none'}; {config.planner.waypoints} waypoints "
         f"{config.planner.waypoint_dt_s} s apart.",
-        "Hidden in training, at these rates, fixed beforehand:",
-        _json(dict(config.planner.dropout)),
+        "Hidden in training, at these rates, alone and together:",
+        _json({**config.planner.dropout, **config.planner.together}),
     )
 
 
