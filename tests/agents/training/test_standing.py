@@ -44,7 +44,8 @@ def reason(moments):
         ({"state": LightState.YELLOW}, LIGHT),
         ({"state": LightState.GREEN}, SOMEBODY),
         ({"line_m": 15.0}, SOMEBODY),
-        ({"speed": 1.0}, NOTHING),
+        ({"speed": 1.0}, LIGHT),  # it comes to a stand
+        ({"speed": 1.0, "line_m": 15.0}, SOMEBODY),
         ({"ways": np.arange(1, 9) * 0.5}, NOTHING),
     ],
 )
