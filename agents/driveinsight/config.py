@@ -44,7 +44,7 @@ DROPOUT: Mapping[str, float] = MappingProxyType(
 # ... and some together: what a policy that is told nothing of the world must do without. The second
 # came later, since a policy without it stood for ever before lights that it was told are green: one
 # sample in a hundred was told of lights while it neither saw nor was told of anybody.
-# Of obstacles x bev: .2 of samples without both, .35 without obstacles alone, .08 without bev alone.
+# Of obstacles x bev: .2 of samples lack both, .35 obstacles alone, .08 bev alone.
 TOGETHER: Mapping[str, float] = MappingProxyType(
     {"map+obstacles+traffic_lights+stop_signs": 0.5, "obstacles+bev": 0.1}
 )
