@@ -36,7 +36,7 @@ from di_envs.sensors.radar.look import Radars
 from di_envs.sensors.route_weather import keyframes_of, weather_at
 from di_envs.sensors.weather import Weather, weather_of
 from di_envs.town.lanes import Lanes
-from di_envs.town.map_chunks import MapChunks, build_map_chunks
+from di_envs.town.map_chunks import MapChunks, map_chunks_of
 from di_envs.town.town import Town
 from di_envs.world.state import State
 from di_envs.world.world import WorldView
@@ -127,7 +127,7 @@ class Observer:
         self._ego, self._town = ego, town
         self._prompt: Prompt | None = None
         self._stop_lines = stop_lines_of(town.signals)
-        self._chunks = build_map_chunks(town.lanes)
+        self._chunks = map_chunks_of(town)
         self._geo_origin = np.array(gnss_origin or town.geo_origin, np.float64)
 
     def of_ego(self, ego: int) -> Observer:

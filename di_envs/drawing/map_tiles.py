@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from di_envs.drawing.outlines import BRIDGE_M, LAND, SURFACE, Array, crosswalk_bars, surfaces
-from di_envs.town.map_chunks import MapKind, build_map_chunks
+from di_envs.town.map_chunks import MapKind, map_chunks_of
 from di_envs.town.town import Town
 
 TILE_PX = 512
@@ -104,7 +104,7 @@ def _shapes_of(town: Town, above: bool) -> list[_Shape]:
     if not above:
         bars = crosswalk_bars(town.crosswalks)
         shapes += [_Shape(points=bar, colour=_BAR) for bar in bars]
-    chunks = build_map_chunks(town.lanes)
+    chunks = map_chunks_of(town)
     high = chunks.points[:, :, 2].mean(axis=1) > BRIDGE_M
     for index in np.flatnonzero((high == above) & (chunks.kind[:, 0] != MapKind.LANE_CENTRE)):
         line = chunks.points[index, :, :2]

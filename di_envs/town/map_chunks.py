@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
 from di_envs.town.lanes import LaneKind, Lanes
+from di_envs.town.once import once_a_town
+from di_envs.town.town import Town
 
 POINTS = 10  # points of a polyline
 SPACING_M = 2.0  # between them, at most
@@ -45,6 +47,12 @@ class MapChunks(NamedTuple):
     grid_size: NDArray[np.int32]  # (2,) columns, rows
     cell_start: NDArray[np.int32]  # (columns * rows + 1,)
     cell_chunk: NDArray[np.int32]  # chunks that may be within RANGE_M of a place in the cell
+
+
+@once_a_town
+def map_chunks_of(town: Town) -> MapChunks:
+    """The polylines of a town."""
+    return build_map_chunks(town.lanes)
 
 
 def build_map_chunks(lanes: Lanes) -> MapChunks:

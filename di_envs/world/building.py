@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import Lanes
+from di_envs.town.once import once_a_town
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 from di_envs.world.dynamics import EgoModel, EgoParameters, locate_ego
@@ -37,7 +38,7 @@ NONE_AT_FIRST = (
 
 @dataclass(frozen=True, kw_only=True)
 class TownTables:
-    """What takes a while to compute of a town, shared by all worlds in it."""
+    """What takes a while to work out of a town, shared by all worlds in it."""
 
     traffic: TrafficTables
     walk: WalkGraph
@@ -45,8 +46,9 @@ class TownTables:
     ego_model: EgoParameters
 
 
+@once_a_town
 def town_tables(town: Town) -> TownTables:
-    """Computes the tables of a town."""
+    """The tables of a town."""
     traffic = traffic_tables(town)
     return TownTables(
         traffic=traffic,

@@ -7,7 +7,6 @@ Sensors intersect their rays with the plane `base_z` and with these boxes, and w
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +22,12 @@ from di_envs.sensors.scene.raster import Raster
 from di_envs.sensors.scene.signal_heads import LAMP_DEPTH_M, LAMP_HALF_M, Lamps, signal_boxes
 from di_envs.sensors.scene.surfaces import build_rasters
 from di_envs.sensors.scene.tags import Tag
+from di_envs.town.once import once_a_town
 from di_envs.town.town import Town
 from di_envs.world.state import State
 
 LONGEST_M = 6.0  # from an actor's middle to what sticks out farthest
 ROOM = 4096  # boxes that a sensor can see at once
-_KEPT = 8  # towns whose scenes are kept
 _LAMP_COLOURS = np.array(
     [(0.0, 0.0, 0.0), (0.10, 1.0, 0.30), (1.0, 0.78, 0.05), (1.0, 0.06, 0.05)], np.float32
 )  # by LightState
@@ -50,21 +49,10 @@ class Scene(NamedTuple):
     parts: Parts  # what actors are made of
 
 
-_scenes: OrderedDict[str, Scene] = OrderedDict()
-
-
+@once_a_town
 def scene_of(town: Town) -> Scene:
-    """The scene of a town; built once a process, about 2 s for Town05.
-
-    A scene is a pure function of its town's content, so the few last ones are kept by that hash.
-    """
-    scene = _scenes.get(town.content_hash)
-    if scene is None:
-        scene = build_scene(town)
-        _scenes[town.content_hash] = scene
-        while len(_scenes) > _KEPT:
-            _scenes.popitem(last=False)
-    return scene
+    """The scene of a town, about 2 s for Town05."""
+    return build_scene(town)
 
 
 def build_scene(town: Town) -> Scene:
