@@ -30,6 +30,8 @@ PLANNING: Mapping[str, Any] = MappingProxyType(
         "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
     }
 )
+# How what sees and plans together is trained: what is rare is shown more often there, too
+RENDERED: Mapping[str, Any] = MappingProxyType({"interest": dict(INTEREST), "mistold": 0.4})
 
 
 class TrainingError(Exception):
@@ -61,12 +63,11 @@ class TrainConfig:
         without: … given all, and without these components, joined by '+'.
         rendered: Whether sensors are; False learns to plan alone, from what truly is in sight.
         eyes: How bad the eyes are that see it.
-        interest: By what there is near the way, how much more often a planner that learns alone is
-            shown a moment; see `interest.reasons`.
-        mistold: Share of the samples of a planner that learns alone that are told wrong speeds; see
-            `planning.told_speeds`.
-        turned_red: Share of the samples of such a planner that stand or come before a green light
-            and are told, and shown, that it is red; see `turned_red`.
+        interest: By what there is near the way, how much more often a moment is shown; see
+            `interest.reasons`. Nothing shows all of them equally often, and all that came of them.
+        mistold: Share of the samples that are told wrong speeds; see `told_speeds`.
+        turned_red: Share of the samples of a planner that learns alone that stand or come before a
+            green light and are told, and shown, that it is red; see `turned_red`.
         among_others: Share of the samples of such a planner that wait at a red light and are given
             the surroundings of another one; see `waiting.among_others`.
         variation: How samples are varied.

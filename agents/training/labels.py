@@ -19,6 +19,7 @@ from agents.driveinsight.seen import OBJECT_COLUMNS, SIGNAL_COLUMNS
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
 from agents.training.future import later_places, later_rasters
+from agents.training.samples import Known, foreseeable
 from agents.training.truth import seen_truth
 from agents.training.waypoints import expert_waypoints
 from agents.zoo.raster import GRID, true_raster
@@ -44,6 +45,7 @@ class LabelledMoment:
         observation: Of that ego.
         waypoints: (T, 2) where the expert went, as that ego sees it [m].
         valid: (T,) 0 or 1: where that is known.
+        known: (T,) 0 or 1: where it could be foreseen, too.
     """
 
     drive: RecordedDrive
@@ -52,6 +54,7 @@ class LabelledMoment:
     observation: Mapping[str, Any]
     waypoints: NDArray[np.float32]
     valid: NDArray[np.float32]
+    known: NDArray[np.float32]
 
 
 def labels_of(
@@ -60,11 +63,16 @@ def labels_of(
     moment: int,
     stage: DriveStage,
     observation: Mapping[str, Any],
+    foreseen: Known = None,
 ) -> dict[str, Tensor]:
-    """The labels of a moment, as a batch of one: `waypoints`, `valid`, and those that are named."""
+    """The labels of a moment, as a batch of one: `waypoints`, `valid`, and those that are named.
+
+    Valid are the waypoints that are known and could be foreseen.
+    """
     state = stage.view.state
     pose = np.array([state.x[0], state.y[0], state.yaw[0]])
     waypoints, valid = expert_waypoints(drive, moment, config.waypoints, pose)
+    known = valid * foreseeable(foreseen, len(valid))
     labelled = LabelledMoment(
         drive=drive,
         moment=moment,
@@ -72,8 +80,9 @@ def labels_of(
         observation=observation,
         waypoints=waypoints,
         valid=valid,
+        known=known,
     )
-    found: dict[str, NDArray[Any]] = {"waypoints": waypoints, "valid": valid}
+    found: dict[str, NDArray[Any]] = {"waypoints": waypoints, "valid": known}
     found |= {name: LABELS[name](labelled) for name in config.labels}
     return {name: torch.from_numpy(value)[None] for name, value in found.items()}
 
@@ -82,12 +91,15 @@ def _action(at: LabelledMoment) -> NDArray[np.float32]:
     """(2,) throttle less brake, and steer, that lead to where the expert went.
 
     Where the ego is set aside its own control would not lead back; where the drive ends that is all
-    there is.
+    there is. What nobody can foresee is waited for.
     """
     throttle, steer, brake = at.drive.controls[at.moment].tolist()
     if at.valid[:2].all():
         speed_mps = float(at.stage.view.state.speed[0])
-        followed, _ = waypoints_to_control(at.waypoints, speed_mps, ControllerMemory(), _FOLLOWING)
+        way = at.waypoints.copy()
+        for place in np.flatnonzero(at.known == 0.0):
+            way[place] = way[place - 1] if place else 0.0
+        followed, _ = waypoints_to_control(way, speed_mps, ControllerMemory(), _FOLLOWING)
         throttle, steer, brake = followed.tolist()
     return np.array([throttle - brake, steer], np.float32)
 

@@ -25,16 +25,18 @@ from agents.processes import births, live_for_parent
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import ALONE, Team
+from agents.training.emphasis import Emphasis, cumulated, meant
 from agents.training.frames import FRAME_S, DriveFileError, RecordedDrive, read_drive
 from agents.training.samples import Batch, Renderer, Sample, batch_of
 from agents.training.towns import training_plan, training_town
 from agents.training.trainees import Config, trainee_from, trainee_of
 from agents.training.variation import Variation
-from di_envs.numerics.keyed_arrays import keyed_uniforms
+from di_envs.numerics.keyed_arrays import keyed_uniforms, stream_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash, uniform
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
 
+_MOMENT = stream_of("which moment is a sample")
 STANDING_MPS = 0.1
 PREFETCHED = 4  # batches that each process renders ahead
 
@@ -67,7 +69,7 @@ class Moments:
 
     def some(self, count: int) -> Moments:
         """So many of them, spread evenly: to see that a policy can learn them by heart."""
-        return self._rows(((np.arange(count) + 0.5) * len(self) / count).astype(np.int64))
+        return self._rows(spread(np.arange(len(self)), count))
 
     def thinned(self, most: int) -> Moments:
         """At most so many of them, keyed by drive and number: of more data, a part of the same."""
@@ -188,19 +190,35 @@ class Samples(Dataset[Sample]):
     Drives and towns are read when they are first wanted, and kept: a few kB a moment.
     """
 
-    def __init__(self, config: Config, training: TrainConfig, moments: Moments) -> None:
-        self._trainee, self._moments = trainee_of(config), moments
+    def __init__(
+        self,
+        config: Config,
+        training: TrainConfig,
+        moments: Moments,
+        emphasis: Emphasis | None = None,
+    ) -> None:
+        """Of a training.
+
+        Args:
+            config: What learns.
+            training: How.
+            moments: From what.
+            emphasis: Of these moments; None where all count alike.
+        """
+        self._trainee, self._moments, self._emphasis = trainee_of(config), moments, emphasis
         self.training = training
-        taught, kept_out = moments.held_out(training.held_out)
-        self._chosen = taught.some(training.overfit) if training.overfit else taught
-        self._measured = kept_out.some(training.measured)
+        taught, kept_out = moments.held_out_rows(training.held_out)
+        self._chosen = spread(taught, training.overfit) if training.overfit else taught
+        self._measured = spread(kept_out, training.measured)
+        weights = np.ones(len(self._chosen)) if emphasis is None else emphasis.weights[self._chosen]
+        self._up_to = cumulated(weights)
         self._drives: dict[int, RecordedDrive] = {}
         self._renderers: dict[str, Renderer] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what it is made from, without what it has read."""
         config = self._trainee.config.to_mapping()
-        return _samples, (config, self.training, self._moments)
+        return _samples, (config, self.training, self._moments, self._emphasis)
 
     def __len__(self) -> int:
         return self.training.steps * self.training.batch
@@ -208,18 +226,26 @@ class Samples(Dataset[Sample]):
     def __getitem__(self, number: int) -> Sample:
         training = self.training
         key = int(keyed_hash(training.seed, int(Stream.AGENT), number, 2)) % 2**62
-        if number < len(self):
-            return self._sample(self._chosen, key % len(self._chosen), training.varied, key, number)
-        unmoved = replace(training.variation, share=0.0)
-        return self._sample(self._measured, number - len(self), unmoved, key, number)
+        if number >= len(self):
+            unmoved = replace(training.variation, share=0.0)
+            return self._sample(int(self._measured[number - len(self)]), unmoved, key, number)
+        mistold = 0.0 if training.overfit else training.mistold
+        row = int(self._chosen[meant(self._up_to, keyed_uniforms(key, _MOMENT, 0, (1,)))[0]])
+        return self._sample(row, training.varied, key, number, mistold)
 
     def _sample(
-        self, moments: Moments, row: int, variation: Variation, key: int, number: int
+        self, row: int, variation: Variation, key: int, number: int, mistold: float = 0.0
     ) -> Sample:
-        drive = self._drive(int(moments.drive[row]))
-        moment = int(moments.moment[row])
-        past = self._past(number)
-        return self._renderer(drive).sample(drive, moment, variation, key, past=past)
+        drive = self._drive(int(self._moments.drive[row]))
+        return self._renderer(drive).sample(
+            drive,
+            int(self._moments.moment[row]),
+            variation,
+            key,
+            past=self._past(number),
+            mistold=mistold,
+            known=None if self._emphasis is None else self._emphasis.known[row],
+        )
 
     def _past(self, number: int) -> int:
         """Moments that are remembered: each number as often, and the same for a whole batch."""
@@ -241,8 +267,13 @@ class Samples(Dataset[Sample]):
         return self._renderers[town]
 
 
-def _samples(config: Mapping[str, Any], training: TrainConfig, moments: Moments) -> Samples:
-    return Samples(trainee_from(config).config, training, moments)
+def _samples(config: Mapping[str, Any], *given: Any) -> Samples:
+    return Samples(trainee_from(config).config, *given)
+
+
+def spread(rows: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """So many of them, spread evenly: with repetitions where there are too few."""
+    return rows[((np.arange(count) + 0.5) * len(rows) / count).astype(np.int64)]
 
 
 def order(training: TrainConfig, first_step: int, share: slice) -> Iterator[int]:

@@ -23,22 +23,21 @@ from agents.driveinsight.seen import Seen
 from agents.training.caching import MomentCache
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team
-from agents.training.foreseen import foreseen
-from agents.training.interest import draw_weights
+from agents.training.emphasis import Emphasis, cumulated, meant
+from agents.training.loading import spread
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through
 from agents.training.standing import stands_for
+from agents.training.told_speeds import told_speeds
 from agents.training.turned_red import told_red, turned_red
 from agents.training.variation import Variation
 from agents.training.waiting import among_others, of_the_one_before
-from di_envs.numerics.keyed_arrays import keyed_normals, keyed_uniforms, stream_of
+from di_envs.numerics.keyed_arrays import keyed_uniforms, stream_of
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.prompt import POSITION_LIMIT_M
 
 _ROWS, _ASIDE = stream_of("moments of a batch"), stream_of("moments set aside")
-_MISTOLD, _OFF = stream_of("speeds that are told wrong"), stream_of("how far off speeds are told")
-_OFF_MPS = 1.0  # standard deviation of a speed that is told wrong
 
 
 @dataclass(frozen=True)
@@ -99,16 +98,16 @@ class PlanningSamples:
         """Keeps some drives out, as `Moments.held_out` does."""
         taught, kept_out = cache.moments.held_out_rows(training.held_out)
         if training.overfit:
-            taught = _spread(taught, training.overfit)
-        weights = draw_weights(cache.rows[taught], training.interest)
+            taught = spread(taught, training.overfit)
+        emphasis = Emphasis.of(cache.rows, training.interest)
         return cls(
             policy=policy,
             training=training,
             cache=cache,
             taught=taught,
-            kept_out=_spread(kept_out, training.measured),
-            valid=foreseen(cache.rows) & (cache.rows["valid"] > 0),
-            drawn=np.cumsum(weights) / weights.sum(),
+            kept_out=spread(kept_out, training.measured),
+            valid=emphasis.known & (cache.rows["valid"] > 0),
+            drawn=cumulated(emphasis.weights[taught]),
             own=own,
         )
 
@@ -117,8 +116,7 @@ class PlanningSamples:
         training = self.training
         key = int(keyed_hash(training.seed, int(Stream.AGENT), step, 2)) % 2**62
         drawn = keyed_uniforms(key, _ROWS, 0, (training.batch,))
-        place = np.searchsorted(self.drawn, drawn, side="right")
-        rows = self.taught[place.clip(max=len(self.taught) - 1)]
+        rows = self.taught[meant(self.drawn, drawn)]
         right_m, turn_rad = set_aside(training.varied, training.batch, key)
         eyes = NO_NOISE if training.overfit else training.eyes
         feigned = _NOTHING if training.overfit else _Feigned.of(training)
@@ -191,23 +189,6 @@ def set_aside(
     return varied * aside * variation.aside_m, varied * turn * variation.turn_rad
 
 
-def told_speeds(
-    moments: NDArray[np.void], mistold: float, key: int
-) -> dict[str, NDArray[np.float32]]:
-    """The speeds, present (B, 1) and past (B, K), of which a share of samples is told wrong ones.
-
-    What is then right is what the scene asks for, and not to go on as one went: who has rolled for
-    a moment at a red light is else taken for one who starts (de Haan et al., Causal Confusion in
-    Imitation Learning, NeurIPS 2019).
-    """
-    speeds = np.concatenate([moments["speed"], moments["speed_history"]], axis=1)
-    wrong = keyed_uniforms(key, _MISTOLD, 0, (len(speeds), 1)) < mistold
-    off = wrong * _OFF_MPS * keyed_normals(key, _OFF, 0, speeds.shape)
-    told = (speeds + off).clip(min=0.0).astype(np.float32)
-    now = moments["speed"].shape[1]
-    return {"speed": told[:, :now], "speed_history": told[:, now:]}
-
-
 class _Moved:
     """Rows in the ego frame, as they are once the ego stands elsewhere.
 
@@ -263,11 +244,6 @@ def _prompt(moments: NDArray[np.void], moved: _Moved) -> dict[str, NDArray[Any]]
         "traffic_lights": moved.rows(_whole(moments["traffic_lights"])),
         "stop_signs": moved.rows(_whole(moments["stop_signs"])),
     }
-
-
-def _spread(rows: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """So many rows, spread evenly."""
-    return rows[((np.arange(count) + 0.5) * len(rows) / count).astype(np.int64)]
 
 
 def _whole(values: NDArray[Any]) -> NDArray[np.float32]:

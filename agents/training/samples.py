@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from agents.base import Requirements
@@ -26,6 +27,7 @@ from agents.driveinsight.losses import Targets
 from agents.driveinsight.model import Inputs
 from agents.training.bev_teacher import bev_semantics
 from agents.training.frames import DriveStage, RecordedDrive
+from agents.training.told_speeds import told_speeds
 from agents.training.variation import Variation, drawn
 from agents.training.waypoints import expert_waypoints
 from di_envs.numerics.keyed_arrays import keyed_uniforms
@@ -33,6 +35,8 @@ from di_envs.numerics.keyed_random import Stream
 from di_envs.observer import Observer
 from di_envs.town.plan import RoutePlan
 from di_envs.town.town import Town
+
+Known = NDArray[np.bool_] | None  # (T,) which waypoints can be foreseen; None for all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,11 +71,20 @@ class Renderer(ABC):
         moment: int,
         stage: DriveStage,
         observation: Mapping[str, Any],
+        known: Known,
     ) -> Any:
-        """What it is to say there."""
+        """What it is to say there, where it can be known."""
 
     def sample(
-        self, drive: RecordedDrive, last: int, variation: Variation, key: int, *, past: int
+        self,
+        drive: RecordedDrive,
+        last: int,
+        variation: Variation,
+        key: int,
+        *,
+        past: int,
+        mistold: float = 0.0,
+        known: Known = None,
     ) -> Sample:
         """The moments that end at `last`.
 
@@ -81,6 +94,8 @@ class Renderer(ABC):
             variation: How it is varied.
             key: Of all draws: equal keys give equal samples.
             past: Moments before it, to be remembered; fewer at a drive's start.
+            mistold: How probably it is told wrong speeds; see `told_speeds`.
+            known: (T,) which waypoints can be foreseen; None for all.
         """
         right_m, turn_rad, weather = drawn(variation, key)
         stage, observer = self._stages(str(drive.facts["route_id"]), drive.capacity)
@@ -89,8 +104,8 @@ class Renderer(ABC):
         for moment in range(max(last - past, 0), last + 1):
             stage.set(drive, moment, right_m=right_m, turn_rad=turn_rad)
             observation = observer.observe()
-            inputs.append(self.inputs(observation, stage))
-        targets = self.targets(drive, last, stage, observation)
+            inputs.append(self.inputs(_mistold(observation, mistold, key), stage))
+        targets = self.targets(drive, last, stage, observation, known)
         return Sample(inputs=tuple(inputs), targets=targets)
 
     def _stage(self, route_id: str, capacity: Any) -> tuple[DriveStage, Observer]:
@@ -120,10 +135,12 @@ class PolicyRenderer(Renderer):
         moment: int,
         stage: DriveStage,
         observation: Mapping[str, Any],
+        known: Known,
     ) -> Targets:
         state = stage.view.state
         pose = np.array([state.x[0], state.y[0], state.yaw[0]])
         waypoints, valid = expert_waypoints(drive, moment, self.config.planner.waypoints, pose)
+        valid *= foreseeable(known, len(valid))
         semantics = None
         if self.config.sensors:
             truth = bev_semantics(stage.view, self.config.grid)
@@ -133,6 +150,22 @@ class PolicyRenderer(Renderer):
             valid=torch.from_numpy(valid)[None],
             semantics=semantics,
         )
+
+
+def _mistold(observation: Mapping[str, Any], share: float, key: int) -> Mapping[str, Any]:
+    """What is shown, at times with wrong speeds."""
+    if not share:
+        return observation
+    speeds = {name: observation[name][None] for name in ("speed", "speed_history")}
+    told = told_speeds(speeds, share, key)
+    return {**observation, **{name: value[0] for name, value in told.items()}}
+
+
+def foreseeable(known: Known, count: int) -> NDArray[np.float32]:
+    """(count,) 1 where a waypoint can be foreseen."""
+    if known is None:
+        return np.ones(count, np.float32)
+    return known[:count].astype(np.float32)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,11 +16,13 @@ from typing import Any
 import torch
 
 from agents.driveinsight.config import PolicyConfig
+from agents.networks.grid import WIDE_GRID, GridConfig
 from agents.networks.weights import weights_digest
-from agents.training.caching import cached
+from agents.training.caching import MomentCache, cached
 from agents.training.collect import data_card
 from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import Team, joined_team
+from agents.training.emphasis import Emphasis
 from agents.training.learning import Training
 from agents.training.loading import Moments, Samples, batches, load_moments
 from agents.training.loop import CHECKPOINT_FILE
@@ -44,7 +46,7 @@ class TrainingPlan:
         device: `cpu`, `cuda`, or `auto`: a GPU if there is one.
         precision: `float32`, `bfloat16`, or `auto`: bfloat16 where the hardware has it built in.
         workers: Processes that render samples; None for the cores that are left.
-        cache: Where moments are kept encoded when nothing is rendered.
+        cache: Where moments are kept encoded.
         seen: Folders of what the policy's own eyes have seen of drives; see `own_eyes`.
     """
 
@@ -145,19 +147,27 @@ def _samples(
     plan: TrainingPlan, config: TrainConfig, moments: Moments, team: Team
 ) -> Samples | PlanningSamples:
     """What renders moments, or what has them encoded: the first of a team encodes them."""
-    if config.rendered:
+    if config.rendered and (config.overfit or not config.interest):
         return Samples(plan.policy, config, moments)
+    if config.rendered:
+        cache = _encoded(moments, WIDE_GRID, plan, team)
+        emphasis = Emphasis.of(cache.rows, config.interest)
+        return Samples(plan.policy, config, cache.moments, emphasis)
     if not isinstance(plan.policy, PolicyConfig):
         raise TrainingError(
             f"'{plan.policy.name}' is a system of the zoo, which learns as a whole from what it is "
             f"shown: leave --plan-only out"
         )
-    if team.first:
-        cached(moments, plan.policy.grid, plan.cache)
-    team.any(False)  # the others wait until it is there
-    cache = cached(moments, plan.policy.grid, plan.cache)
+    cache = _encoded(moments, plan.policy.grid, plan, team)
     own = own_eyes(cache.moments, plan.seen) if plan.seen else None
     return PlanningSamples.of(plan.policy, config, cache, own)
+
+
+def _encoded(moments: Moments, grid: GridConfig, plan: TrainingPlan, team: Team) -> MomentCache:
+    if team.first:
+        cached(moments, grid, plan.cache)
+    team.any(False)  # the others wait until it is there
+    return cached(moments, grid, plan.cache)
 
 
 def _filled_in(

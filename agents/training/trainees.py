@@ -29,6 +29,7 @@ from agents.training.model_card import about_policy, about_system
 from agents.training.predictions import look, on_device
 from agents.training.samples import (
     Batch,
+    Known,
     PolicyRenderer,
     Renderer,
     hidden_components,
@@ -275,8 +276,9 @@ class SystemRenderer(Renderer):
         moment: int,
         stage: DriveStage,
         observation: Mapping[str, Any],
+        known: Known,
     ) -> Mapping[str, Tensor]:
-        return labels_of(self._config, drive, moment, stage, observation)
+        return labels_of(self._config, drive, moment, stage, observation, known)
 
 
 def trainee_of(config: Config) -> Trainee:

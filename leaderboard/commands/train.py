@@ -200,7 +200,7 @@ class Train:
 
     def _plan(self) -> TrainingPlan:
         """What the arguments ask for."""
-        from agents.training.config import PLANNING, TrainConfig
+        from agents.training.config import PLANNING, RENDERED, TrainConfig
         from agents.training.session import TrainingPlan
         from agents.training.trainees import config_named
 
@@ -216,7 +216,7 @@ class Train:
                 overfit=self.overfit,
                 threads=self.threads,
                 held_out=self.held_out,
-                **(PLANNING if self.plan_only else {}),
+                **(PLANNING if self.plan_only else RENDERED),
             )
         except ValueError as error:
             raise UsageError(str(error)) from error

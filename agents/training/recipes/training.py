@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from agents.driveinsight.config import config_named as paper_config_named
-from agents.training.config import HELD_OUT, PLANNING, TrainConfig
+from agents.training.config import HELD_OUT, PLANNING, RENDERED, TrainConfig
 from agents.training.log import read_rows, write_curve
 from agents.training.loop import LOG_FILE, train
 from agents.training.recipes.kinds import POLICY_FOLDER, SEEN_FOLDER, Made, Progress, StageRun
@@ -107,6 +107,7 @@ class TrainStage:
             warm_up=min(200, self.steps // 10),
             held_out=self.held_out,
             seed=seed,
+            **RENDERED,
         )
 
 

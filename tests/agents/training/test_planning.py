@@ -16,7 +16,8 @@ from agents.training.learning import Training
 from agents.training.loading import load_moments, town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
-from agents.training.planning import PlanningSamples, set_aside, told_speeds
+from agents.training.planning import PlanningSamples, set_aside
+from agents.training.told_speeds import told_speeds
 from agents.training.variation import Variation
 from agents.training.waypoints import expert_waypoints
 from di_envs.observer import Observer
@@ -63,7 +64,7 @@ def test_what_is_encoded_and_set_aside_is_what_would_be_observed_there(cache, mo
         "agents.training.planning.set_aside",
         lambda *_: (np.full(4, right_m), np.full(4, turn_rad)),
     )
-    one = dataclasses.replace(samples, taught=np.array([row]))
+    one = dataclasses.replace(samples, taught=np.array([row]), drawn=np.ones(1))
     batch = one.batch(0, BOTH)
     prompt = batch.inputs[0].prompt
     for name in ("target_point", "routing", "speed", "speed_history"):
