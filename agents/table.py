@@ -82,7 +82,7 @@ AGENTS: dict[str, AgentEntry] = {
     "driveinsight": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="the paper's policy: cameras, LiDAR and prompt to waypoints",
-        version=2,
+        version=3,
         options={"shipped": "driveinsight"},
         data="driveinsight/weights/driveinsight",
         data_files=POLICY_FILES,
@@ -109,7 +109,7 @@ AGENTS: dict[str, AgentEntry] = {
     "driveinsight-town05": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="as driveinsight, with drives of Town05 in training, as the paper's main row",
-        version=1,
+        version=2,
         options={"shipped": "driveinsight-town05"},
         data="driveinsight/weights/driveinsight-town05",
         data_files=POLICY_FILES,

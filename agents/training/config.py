@@ -30,8 +30,11 @@ PLANNING: Mapping[str, Any] = MappingProxyType(
         "without": ("obstacles", "bev", "obstacles+bev", "traffic_lights", _TOLD, f"{_TOLD}+bev"),
     }
 )
-# How what sees and plans together is trained: what is rare is shown more often there, too
-RENDERED: Mapping[str, Any] = MappingProxyType({"interest": dict(INTEREST), "mistold": 0.4})
+# How what sees and plans together is trained: what is rare is shown more often there, too, and who
+# stands and stays less often: of few samples it is else learnt that whoever stands stands on
+RENDERED: Mapping[str, Any] = MappingProxyType(
+    {"interest": dict(INTEREST), "mistold": 0.4, "standing_share": 0.1}
+)
 
 
 class TrainingError(Exception):
