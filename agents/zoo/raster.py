@@ -37,7 +37,7 @@ class RasterChannel(IntEnum):
     WALKER = 4
     RED = 5  # the stop line of a red or yellow light
     GREEN = 6
-    STOP_SIGN = 7
+    STOP_SIGN = 7  # the line of one at which the ego has not stopped yet
     AHEAD = 8  # velocity over the ground of who is there
     RIGHT = 9
 
@@ -89,7 +89,8 @@ def _signals(view: WorldView, out: NDArray[np.float32]) -> None:
     for row in np.flatnonzero(near):
         signal = int(signals.stop_signal[row])
         channel = _channel_of(int(signals.kind[signal]), int(state.light[signal]))
-        if channel is None:
+        done = bool(state.stop_done[0]) and signal == int(state.stop_target[0])
+        if channel is None or (done and channel == RasterChannel.STOP_SIGN):
             continue
         x, y, _, yaw = signals.stop_pose[row].tolist()
         half, back = 0.5 * float(signals.stop_width_m[row]), 0.5 * STOP_DEPTH_M

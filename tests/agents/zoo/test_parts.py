@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 
 from agents import AgentSpecError
+from agents.training.frames import DriveStage
 from agents.zoo.ego_only.config import EgoOnlyConfig
 from agents.zoo.interfuser.losses import density_map, traffic_state
 from agents.zoo.lbc.points import (
@@ -17,11 +19,14 @@ from agents.zoo.lbc.points import (
     share_of_image,
 )
 from agents.zoo.ppo.agent import PpoAgent
-from agents.zoo.raster import GRID
+from agents.zoo.raster import GRID, RasterChannel, true_raster
 from agents.zoo.registry import config_of, network_of
 from agents.zoo.roach_raster.config import RoachConfig
 from agents.zoo.system import FAMILY, SystemConfig
 from agents.zoo.transfuser.config import TransfuserConfig
+from di_envs.route_env import RouteEnv
+from di_envs.town.lanes import SignalKind
+from di_envs.world.kinds import ActorKind
 
 FRONT = FAMILY.cameras[0]
 
@@ -112,3 +117,23 @@ def test_sizes_that_do_not_go_together_are_refused():
 def test_ppo_without_its_model_says_how_to_make_one():
     with pytest.raises(AgentSpecError, match=r"not trained yet: python examples/train_ppo\.py"):
         PpoAgent(shipped="ppo")
+
+
+def test_a_stop_sign_is_drawn_until_the_ego_has_stopped_for_it():
+    env = RouteEnv(suite="town05_short", observations=("prompt",), traffic=0, walkers=0)
+    observation, _ = env.reset(seed=0, options={"route": "12"})
+    stage = DriveStage(env.view.town, env.plan, env.view.capacity)
+    state, signals = stage.view.state, stage.view.town.signals
+    (sign, *_) = np.flatnonzero(signals.kind[signals.stop_signal] == SignalKind.STOP)
+    x, y, z, yaw = signals.stop_pose[sign]
+    state.x[0], state.y[0], state.z[0] = x - 8.0 * np.cos(yaw), y - 8.0 * np.sin(yaw), z
+    state.yaw[0], state.kind[0], state.stop_target[0] = yaw, ActorKind.CAR, -1
+
+    def drawn():
+        return true_raster(stage.view, observation["routing"])[RasterChannel.STOP_SIGN].any()
+
+    assert drawn()
+    state.stop_target[0] = signals.stop_signal[sign]
+    assert drawn()
+    state.stop_done[0] = 1
+    assert not drawn()
