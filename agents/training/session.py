@@ -29,7 +29,7 @@ from agents.training.loop import CHECKPOINT_FILE
 from agents.training.own_eyes import digest_of_rows, own_eyes
 from agents.training.planning import PlanningSamples
 from agents.training.samples import Batch
-from agents.training.trainees import Config
+from agents.training.trainees import Config, trainee_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,10 +175,11 @@ def _filled_in(
 ) -> TrainConfig:
     """The configuration with what only now is known: it decides what comes out, too."""
     learns_all = not plan.training.overfit and moments.drives > 1  # a single one is for learning
+    convolves = plan.training.rendered and trainee_of(plan.policy).convolves
     try:
         return replace(
             plan.training,
-            precision=chosen_precision(plan.precision, device),
+            precision=chosen_precision(plan.precision, device, convolves=convolves),
             processes=team.size,
             held_out=plan.training.held_out if learns_all else 0.0,
             data=moments.digest,

@@ -70,6 +70,11 @@ class Trainee(ABC):
     def requires(self) -> Requirements:
         """What it needs from its environment."""
 
+    @property
+    def convolves(self) -> bool:
+        """Whether most of its time goes into convolutions, as with pictures."""
+        return "camera" in self.requires.observations
+
     @abstractmethod
     def network(self) -> nn.Module:
         """Fresh weights, drawn from torch's generator."""
@@ -240,8 +245,8 @@ class SystemTrainee(Trainee):
         with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
             for moment in batch.inputs:
                 output = network(on_device(moment, device), output.state if output else None)
-        assert output is not None, "a batch has a moment"
-        terms = network.loss(output, on_device(batch.targets, device))
+            assert output is not None, "a batch has a moment"
+            terms = network.loss(output, on_device(batch.targets, device))  # some have layers
         size = torch.tensor(float(len(output.waypoints)), device=device)
         total = torch.stack([term.float() for term in terms.values()]).sum()
         return {**terms, "total": total}, dict.fromkeys(terms, size)

@@ -27,7 +27,9 @@ class SpatialSoftmax(nn.Module):
         share = (heat.float().flatten(2) * self.temperature).softmax(dim=2).unflatten(2, (rows, -1))
         down = (torch.arange(rows, device=heat.device) + 0.5) / rows
         right = (torch.arange(columns, device=heat.device) + 0.5) / columns
-        return torch.stack([share.sum(3) @ down, share.sum(2) @ right], dim=2)
+        # no products of matrices: mixed precision would round places to a 256th of a side
+        places = ((share.sum(3) * down).sum(2), (share.sum(2) * right).sum(2))
+        return torch.stack(places, dim=2)
 
 
 def heat_of(places: Tensor, rows: int, columns: int, radius: float) -> Tensor:

@@ -40,7 +40,8 @@ def sampled_paths(speed_mps: Tensor, command: Tensor, count: int) -> Tensor:
     moving = torch.where(acceleration < 0.0, speed / (-acceleration).clamp(min=1e-3), 1e3)
     time = torch.minimum(time, moving)  # (B, A, T)
     station = (speed * time + 0.5 * acceleration * time.square())[:, :, None]  # (B, A, 1, T)
-    reach = command @ speed_mps.new_tensor(REACH)  # (B, 2)
+    # no product of matrices, which mixed precision would round: (B, 2)
+    reach = (command[:, :, None] * speed_mps.new_tensor(REACH)).sum(dim=1)
     share = torch.linspace(0.0, 1.0, CURVATURES, device=speed_mps.device)
     curvature = torch.lerp(reach[:, :1], reach[:, 1:], share)[:, None, :, None]  # (B, 1, J, 1)
     half = 0.5 * curvature * station  # half of what it has turned

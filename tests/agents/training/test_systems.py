@@ -92,6 +92,9 @@ def test_one_batch_is_learnt_by_heart(name, moments):
     for term in LEARNT.get(name, ("waypoints",)):
         assert last[term] < 0.5 * first[term], (term, first, last)
     assert last["total"] < 0.25 * first["total"], (first, last)
+    mixed = dataclasses.replace(by_heart, precision="bfloat16")
+    rounded = Training.begin(config, mixed, "cpu").update(batch)
+    assert rounded["total"] == pytest.approx(first["total"], rel=0.05), (first, rounded)
 
 
 @pytest.mark.parametrize("untrained", NAMES, indirect=True)
