@@ -23,14 +23,16 @@ class AgentEntry:
     data: str = ""  # folder beside this file that the agent reads, such as weights
     data_files: tuple[str, ...] = ()  # those of a folder that decide what it does; () for all
     packages: tuple[str, ...] = ()  # whose version can change what it does
-    score: str = ""  # driving score on town05_short, seed 0, of a system of the zoo
+    score: str = ""  # driving score on town05_short, three seeds, of a system of the zoo
 
 
 POLICY_FILES = ("config.json", "weights.safetensors")  # that decide what a policy does
 
 
-def _system(name: str, agent: str, summary: str, *, version: int = 1) -> AgentEntry:
-    """A system of the zoo: its name, `folder:Class` of its driver, and what it is."""
+def _system(
+    name: str, agent: str, summary: str, *, score: str = "", version: int = 1
+) -> AgentEntry:
+    """A system of the zoo: its name, `folder:Class` of its driver, what it is, how well it does."""
     folder, _, driver = agent.partition(":")
     return AgentEntry(
         entry_point=f"agents.zoo.{folder}.agent:{driver}",
@@ -40,6 +42,7 @@ def _system(name: str, agent: str, summary: str, *, version: int = 1) -> AgentEn
         data=f"zoo/{folder}/weights/{name}",
         data_files=POLICY_FILES,
         packages=("torch",),
+        score=score,
     )
 
 
@@ -125,10 +128,16 @@ AGENTS: dict[str, AgentEntry] = {
         packages=("torch",),
     ),
     "ego-only": _system(
-        "ego-only", "ego_only:EgoOnlyAgent", "AD-MLP: target, command and speed alone, the floor"
+        "ego-only",
+        "ego_only:EgoOnlyAgent",
+        "AD-MLP: target, command and speed alone, the floor",
+        score="29.2",
     ),
     "roach-raster": _system(
-        "roach-raster", "roach_raster:RoachAgent", "Roach: the true view from above, the teacher"
+        "roach-raster",
+        "roach_raster:RoachAgent",
+        "Roach: the true view from above, the teacher",
+        score="89.6",
     ),
     "transfuser": _system(
         "transfuser", "transfuser:TransfuserAgent", "images and LiDAR joined at several scales"

@@ -133,6 +133,12 @@ GOLDEN: dict[str, GoldenDrive] = {
     "route-only on town05_short": GoldenDrive(
         agent="route-only", suite="town05_short", route="8", seconds=3.0
     ),
+    "ego-only on town05_short": GoldenDrive(
+        agent="ego-only", suite="town05_short", route="8", seconds=3.0
+    ),
+    "roach-raster on town05_short": GoldenDrive(
+        agent="roach-raster", suite="town05_short", route="8", seconds=3.0
+    ),
     "every sensor in rain": GoldenDrive(
         agent="expert", suite="town05_short", route="0", seconds=2.0, shown=EVERY_SENSOR
     ),
