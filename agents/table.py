@@ -137,7 +137,7 @@ AGENTS: dict[str, AgentEntry] = {
         "roach-raster",
         "roach_raster:RoachAgent",
         "Roach: the true view from above, the teacher",
-        score="89.6",
+        score="89.3",
     ),
     "transfuser": _system(
         "transfuser", "transfuser:TransfuserAgent", "images and LiDAR joined at several scales"
