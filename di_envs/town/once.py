@@ -21,8 +21,8 @@ _Value = TypeVar("_Value")
 def once_a_town(work_out: Callable[[Town], _Value]) -> Callable[[Town], _Value]:
     """Lets a pure function of a town run once for each; whoever gets its value must not change it.
 
-    A town is known again by its hash and by its arrays, so one that was changed in memory, or in a
-    cache, under the same hash is another. Threads that want the same wait for the first.
+    A town is known again by its hash, its text and its arrays, so one that was changed in memory,
+    or in a cache, under the same hash is another. Threads that want the same wait for the first.
     """
     kept: OrderedDict[str, tuple[Town, _Value]] = OrderedDict()
     lock = Lock()
@@ -45,4 +45,4 @@ def _same(one: Town, other: Town) -> bool:
     if one is other:
         return True
     arrays = (chain(town.lanes, town.signals, town.crosswalks) for town in (one, other))
-    return all(map(np.array_equal, *arrays))
+    return one.opendrive == other.opendrive and all(map(np.array_equal, *arrays))

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.town.lanes import LaneKind, Lanes
+from di_envs.town.once import once_a_town
 from di_envs.town.plan import RoadOption
 from di_envs.town.routing.carla_roads import CarlaRoads, Place, away_m
 from di_envs.town.routing.pieces import Piece, cut_lanes
@@ -112,6 +113,7 @@ class RoadGraph:
         return math.dist(self.nodes[start], self.nodes[goal])
 
 
+@once_a_town
 def build_road_graph(town: Town) -> RoadGraph:
     """Lays out the planning graph of a town's driving lanes.
 
