@@ -140,7 +140,10 @@ AGENTS: dict[str, AgentEntry] = {
         score="89.3",
     ),
     "transfuser": _system(
-        "transfuser", "transfuser:TransfuserAgent", "images and LiDAR joined at several scales"
+        "transfuser",
+        "transfuser:TransfuserAgent",
+        "images and LiDAR joined at several scales",
+        score="85.5",
     ),
     "interfuser": _system(
         "interfuser", "interfuser:InterfuserAgent", "all views in a transformer, safety controller"

@@ -136,6 +136,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     "ego-only on town05_short": GoldenDrive(
         agent="ego-only", suite="town05_short", route="8", seconds=3.0
     ),
+    "transfuser on town05_short": GoldenDrive(
+        agent="transfuser", suite="town05_short", route="8", seconds=2.0
+    ),
     "roach-raster on town05_short": GoldenDrive(
         agent="roach-raster", suite="town05_short", route="8", seconds=3.0
     ),
