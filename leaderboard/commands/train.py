@@ -74,7 +74,7 @@ class Train:
     second. What sees stays as it is, and checks are driven with lent eyes (`true-sight`)."""
 
     cache: Annotated[Path, says("DIR", "cache")] = Path("cache")
-    """Where moments are kept encoded for --plan-only: 5 kB each, at most 100,000 of them."""
+    """Where moments are kept encoded: 5 kB each, at most 100,000 of them."""
 
     data: Annotated[tuple[Path, ...], says("DIR ...", "data")] = (Path("data"),)
     """Folders of drives: the expert's, and corrections of learners' (`collect --driver`)."""

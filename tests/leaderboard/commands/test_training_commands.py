@@ -32,6 +32,7 @@ def policy(data, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     arguments = ["--config", "driveinsight-told", "--data", str(data), "--output", str(folder)]
     arguments += ["--steps", "3", "--batch", "2", "--workers", "0"]
+    arguments += ["--cache", str(folder / "cache")]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     return folder / "policy"
 
@@ -59,6 +60,7 @@ def test_training_that_is_done_says_so_again_and_trains_no_more(policy, data, ca
     before = (policy / "weights.safetensors").read_bytes()
     arguments = ["--config", "driveinsight-told", "--data", str(data)]
     arguments += ["--output", str(policy.parent), "--steps", "3", "--batch", "2", "--workers", "0"]
+    arguments += ["--cache", str(policy.parent / "cache")]
     assert main(["train", *arguments, "--check-routes", "1", "--check-every", "3"]) == 0
     out = capsys.readouterr().out
     assert "Goes on from step 3" in out
@@ -70,6 +72,7 @@ def test_beginning_with_another_policy_tells_what_was_taken(policy, data, tmp_pa
     arguments = ["--config", "route-only", "--data", str(data), "--output"]
     arguments += [str(tmp_path), "--steps", "1", "--batch", "1", "--workers", "0"]
     arguments += ["--check-routes", "0", "--init-from", str(policy)]
+    arguments += ["--cache", str(tmp_path / "cache")]
     assert main(["train", *arguments]) == 0
     out = capsys.readouterr().out
     assert "Taken from" in out
