@@ -25,7 +25,8 @@ from agents.driveinsight.reading import read_seen
 from agents.driveinsight.weights import from_pretrained
 from agents.networks.fused import fuse_norms
 from agents.training.frames import read_drive
-from agents.training.loading import load_moments, town_of
+from agents.training.loading import town_of
+from agents.training.moments import load_moments
 from agents.training.perceiving import look, moments_of
 from agents.training.perception_metrics import FIGURES, figures, perception_sums
 from agents.training.sequences import Moments, SequenceRenderer

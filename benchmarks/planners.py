@@ -24,7 +24,7 @@ from agents.driveinsight.config import PlannerConfig, PolicyConfig, config_named
 from agents.training.caching import MomentCache, cached
 from agents.training.config import PLANNING, TrainConfig
 from agents.training.learning import Training
-from agents.training.loading import load_moments
+from agents.training.moments import load_moments
 from agents.training.planning import PlanningSamples
 
 VARIANTS: Mapping[str, PlannerConfig] = MappingProxyType(

@@ -21,7 +21,8 @@ from agents.training.caching import cached
 from agents.training.collect import DriveJob, drive_job, drive_paths
 from agents.training.config import PLANNING, TrainConfig
 from agents.training.learning import Training
-from agents.training.loading import Moments, Samples, batches, load_moments
+from agents.training.loading import Samples, batches
+from agents.training.moments import Moments, load_moments
 from agents.training.planning import PlanningSamples
 
 TOWNS = ("small_grid", "suburb")

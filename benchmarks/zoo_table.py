@@ -3,7 +3,7 @@
     driveinsight evaluate --agent transfuser --suite town05_short --seeds 3 --output t-short
     driveinsight evaluate --agent transfuser --suite town05_long --seeds 1 --output t-long
     ...
-    python benchmarks/zoo_table.py t-short t-long ...
+    python -m benchmarks.zoo_table t-short t-long ...
 
 Give the folders of all systems together. SR is the share of drives that were completed without an
 infraction. Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
@@ -36,11 +36,11 @@ from leaderboard.tables.run_tables import driving_interval, scored_per_km, seed_
 SUITES = ("town05_short", "town05_long")
 DRAWS = 2000  # of the routes, for the correlation's interval
 NORMAL_95 = 1.96
-COLUMNS = "DS|RC|IS|SR|a km"
+COLUMNS = ("DS", "RC", "IS", "SR", "a km")  # on either suite
 HEADER = (
-    f"| system |{' |'.join(f' {name}' for name in COLUMNS.split('|'))} "
-    f"|{' |'.join(f' {name}' for name in COLUMNS.split('|'))} "
-    "| parameters | ms | paper Short | paper Long | Town05 in its training |"
+    "system",
+    *(f"{suite} {name}" for suite in ("Short", "Long") for name in COLUMNS),
+    *("parameters", "ms", "paper Short", "paper Long", "Town05 in its training"),
 )
 
 
@@ -86,7 +86,7 @@ def success_rate(run: RunRecord) -> float:
 
 def _cells(run: RunRecord | None) -> list[str]:
     if run is None:
-        return ["-"] * len(COLUMNS.split("|"))
+        return ["-"] * len(COLUMNS)
     means = {
         name: mean_interval(seed_means(run.routes, name, run.seeds)).mean
         for name in ("route_completion", "infraction_score")
@@ -185,8 +185,8 @@ def main() -> None:
         return tuple(-driving_interval(runs[s]).mean if s in runs else 0.0 for s in SUITES[::-1])
 
     systems = system_names()
-    print(HEADER)
-    print(f"|---|{'---:|' * (HEADER.count('|') - 3)}---|")
+    print(f"| {' | '.join(HEADER)} |")
+    print(f"|---|{'---:|' * (len(HEADER) - 2)}---|")
     for name in sorted(found, key=rank):
         print(_row(name, found[name], systems), flush=True)
     print(*("\n" + rank_line(suite, found) for suite in SUITES), sep="")

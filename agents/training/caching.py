@@ -21,7 +21,8 @@ from agents.driveinsight.seen import OBJECT_COLUMNS, OBJECTS, SIGNAL_COLUMNS, SI
 from agents.networks.grid import GridConfig
 from agents.training.config import TrainingError
 from agents.training.frames import DriveFileError, DriveStage, RecordedDrive, read_drive
-from agents.training.loading import Moments, town_of
+from agents.training.loading import town_of
+from agents.training.moments import Moments
 from agents.training.truth import seen_truth
 from agents.training.waypoints import expert_waypoints
 from di_envs.files.whole import write_whole

@@ -27,7 +27,8 @@ from agents.one_thread import one_thread
 from agents.processes import in_order, processes
 from agents.training.config import TrainingError
 from agents.training.frames import RecordedDrive, read_drive
-from agents.training.loading import Moments, town_of
+from agents.training.loading import town_of
+from agents.training.moments import Moments
 from agents.training.perceiving import look
 from agents.training.sequences import Moments as Shown
 from agents.training.sequences import SequenceRenderer

@@ -10,8 +10,8 @@ from torch.utils.data import Dataset
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.frames import RecordedDrive, read_drive
-from agents.training.loading import Moments as Chosen
 from agents.training.loading import town_of
+from agents.training.moments import Moments as Chosen
 from agents.training.perceive_config import PerceiveConfig
 from agents.training.sequences import Moments, SequenceRenderer
 from agents.training.variation import Variation

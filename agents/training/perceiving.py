@@ -30,7 +30,7 @@ from agents.driveinsight.weights import save_pretrained
 from agents.training.board import BOARD_FOLDER, Tell, board
 from agents.training.checkpoints import load_checkpoint, rate_at, save_checkpoint
 from agents.training.config import TrainingError
-from agents.training.loading import load_moments, rendered
+from agents.training.loading import rendered
 from agents.training.log import append_row, forget_rows_after
 from agents.training.loop import (
     CHECKPOINT_EVERY_S,
@@ -39,6 +39,7 @@ from agents.training.loop import (
     LOG_FILE,
     POLICY_FOLDER,
 )
+from agents.training.moments import load_moments
 from agents.training.perceive_config import PerceiveConfig
 from agents.training.perceive_samples import Sequences, order
 from agents.training.perception_metrics import figures, perception_sums

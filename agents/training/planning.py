@@ -24,7 +24,7 @@ from agents.training.caching import MomentCache
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team
 from agents.training.emphasis import Emphasis, cumulated, meant
-from agents.training.loading import spread
+from agents.training.moments import spread
 from agents.training.own_eyes import OwnEyes
 from agents.training.samples import Batch
 from agents.training.seen_noise import NO_NOISE, EyeConfig, seen_through

@@ -24,8 +24,9 @@ from agents.training.config import TrainConfig, TrainingError
 from agents.training.distributed import Team, joined_team
 from agents.training.emphasis import Emphasis
 from agents.training.learning import Training
-from agents.training.loading import Moments, Samples, batches, load_moments
+from agents.training.loading import Samples, batches
 from agents.training.loop import CHECKPOINT_FILE
+from agents.training.moments import Moments, load_moments
 from agents.training.own_eyes import digest_of_rows, own_eyes
 from agents.training.planning import PlanningSamples
 from agents.training.samples import Batch

@@ -25,7 +25,8 @@ from agents.driveinsight.semantics import likeliest
 from agents.driveinsight.weights import from_pretrained
 from agents.networks.grid import GridConfig
 from agents.training.frames import read_drive
-from agents.training.loading import load_moments, town_of
+from agents.training.loading import town_of
+from agents.training.moments import load_moments
 from agents.training.perceiving import look
 from agents.training.perception_metrics import SCORE
 from agents.training.sequences import SequenceRenderer

@@ -15,8 +15,9 @@ import torch
 from agents.training.config import TrainConfig
 from agents.training.distributed import ALONE, Team, joined_team
 from agents.training.learning import Training
-from agents.training.loading import Samples, batches, load_moments, order
+from agents.training.loading import Samples, batches, order
 from agents.training.loop import CHECKPOINT_FILE, train
+from agents.training.moments import load_moments
 from tests.agents.training.small_policies import PROMPT_ONLY
 
 TWO = TrainConfig(steps=6, batch=4, warm_up=2, processes=2, held_out=0.5)

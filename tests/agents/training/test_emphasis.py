@@ -9,7 +9,8 @@ import torch
 from agents.training.caching import cached
 from agents.training.config import RENDERED, TrainConfig
 from agents.training.emphasis import Emphasis, cumulated, meant
-from agents.training.loading import Samples, load_moments
+from agents.training.loading import Samples
+from agents.training.moments import load_moments
 from agents.training.trainees import config_named
 from agents.zoo.raster import GRID
 

@@ -15,7 +15,8 @@ from agents.training.caching import cached
 from agents.training.collect import drive_paths
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import read_drive, write_drive
-from agents.training.loading import load_moments, town_of
+from agents.training.loading import town_of
+from agents.training.moments import load_moments
 from agents.training.own_eyes import (
     CHUNK,
     SEEN,

@@ -14,9 +14,10 @@ from agents.driveinsight.perception_losses import PerceptionWeights
 from agents.driveinsight.weights import from_pretrained
 from agents.training.config import TrainingError
 from agents.training.frames import read_drive
-from agents.training.loading import load_moments, town_of
+from agents.training.loading import town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, POLICY_FOLDER
+from agents.training.moments import load_moments
 from agents.training.perceive_config import PerceiveConfig
 from agents.training.perceiving import (
     look,

@@ -13,9 +13,10 @@ from agents.training.caching import MOMENT, MomentReader, cached
 from agents.training.config import PLANNING, TrainConfig, TrainingError
 from agents.training.frames import DriveStage, read_drive
 from agents.training.learning import Training
-from agents.training.loading import load_moments, town_of
+from agents.training.loading import town_of
 from agents.training.log import read_rows
 from agents.training.loop import CHECKPOINT_FILE, LOG_FILE, train
+from agents.training.moments import load_moments
 from agents.training.planning import PlanningSamples, set_aside
 from agents.training.told_speeds import told_speeds
 from agents.training.variation import Variation

@@ -14,7 +14,8 @@ from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig
 from agents.training.frames import read_drive
 from agents.training.learning import Training
-from agents.training.loading import Samples, batches, load_moments, town_of
+from agents.training.loading import Samples, batches, town_of
+from agents.training.moments import load_moments
 from agents.training.samples import batch_of
 from agents.training.trainees import config_named, trainee_from, trainee_of
 from agents.training.variation import NO_VARIATION

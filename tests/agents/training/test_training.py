@@ -22,7 +22,7 @@ from agents.training.collect import drive_paths
 from agents.training.config import HELD_OUT, TrainConfig, TrainingError
 from agents.training.frames import DriveFileError, read_drive
 from agents.training.learning import Training
-from agents.training.loading import Samples, batches, load_moments
+from agents.training.loading import Samples, batches
 from agents.training.log import forget_rows_after, read_rows, write_curve
 from agents.training.loop import (
     CHECKPOINT_FILE,
@@ -32,6 +32,7 @@ from agents.training.loop import (
     Checks,
     train,
 )
+from agents.training.moments import load_moments
 from agents.training.predictions import look
 from agents.training.samples import batch_of, hidden_components
 from agents.training.waypoints import expert_waypoints
