@@ -12,13 +12,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from di_envs.sensors.route_weather import says_nothing
+from di_envs.town.kept import kept
 from di_envs.town.plan import RoutePlan
 from di_envs.town.routing.remarks import odd_routes
-from di_envs.town.routing.road_graph import RoadGraph
+from di_envs.town.routing.road_graph import RoadGraph, build_road_graph
 from di_envs.town.routing.router import RouteError, plan_route
 from di_envs.town.routing.routes import RouteSpec
 from di_envs.town.routing.scenarios import placed_on_routes, types_left_out, with_scenarios
 from di_envs.town.routing.trigger_files import PlacedScenario
+from di_envs.town.town import Town
 
 SHOWN = 3  # of the refused routes: those with their reason
 
@@ -40,8 +42,9 @@ class PlannedRoutes:
     notes: tuple[str, ...] = ()
 
 
+@kept
 def plan_routes(
-    graph: RoadGraph,
+    town: Town,
     specs: Sequence[RouteSpec],
     *,
     file: str,
@@ -54,7 +57,7 @@ def plan_routes(
     """Plans routes with their weathers and scenarios; refuses those that cannot be, by their id.
 
     Args:
-        graph: Of the town.
+        town: Where.
         specs: The routes.
         file: What messages call their file.
         max_snap_m: Largest distance of a keypoint from its lane.
@@ -66,7 +69,7 @@ def plan_routes(
     Raises:
         RouteError: If none can be planned, or one cannot and that is strict.
     """
-    plans: list[RoutePlan] = []
+    graph, plans = build_road_graph(town), list[RoutePlan]()
     refused = dict(broken or {})
     if strict and refused:
         raise RouteError(next(iter(refused.values())))

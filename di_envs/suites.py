@@ -143,13 +143,12 @@ class Suite:
                 strict, if the file was written for another town and fits this one nowhere
                 (`RouteFileError`), and if a trigger file is broken (`TriggerFileError`).
         """
-        graph, file = build_road_graph(town), self.routes_path.name
-        found = self._of_town(town.name)
+        found, file = self._of_town(town.name), self.routes_path.name
         asked = self._asked_for(found, route_ids)
-        remark = "" if self.version else remark_on_towns(graph, found, file)
+        remark = "" if self.version else remark_on_towns(build_road_graph(town), found, file)
         tried = found if strict else asked
         planned = plan_routes(
-            graph,
+            town,
             tried.specs,
             file=file,
             max_snap_m=self.max_snap_m,

@@ -7,6 +7,7 @@ stand for gigabytes. Nothing here runs code: arrays are read without pickles.
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import stat
 import zipfile
@@ -82,6 +83,15 @@ def read_arrays(path: Path, most: int = MOST_UNPACKED) -> dict[str, NDArray[Any]
     except Exception as error:  # of NumPy, zipfile, zlib: whatever bytes can bring about in them
         said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise ArraysError(f"{path}: is no whole archive of arrays ({said})") from error
+
+
+def arrays_digest(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Names arrays with all that they hold."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode() + array.tobytes())
+    return digest.hexdigest()
 
 
 def check_array(

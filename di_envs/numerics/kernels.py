@@ -64,6 +64,7 @@ def sources_digest(module: str) -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def cpu_capability() -> str:
     """The CPU that code is compiled for: its name and a hash of the features it offers."""
     features = llvmlite.binding.get_host_cpu_features().flatten()

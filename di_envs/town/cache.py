@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from di_envs.files.caches import cache_folders, warn_not_kept, writable_cache
 from di_envs.files.json_values import from_json, parsed
-from di_envs.files.received import read_arrays
+from di_envs.files.received import arrays_digest, read_arrays
 from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals
 from di_envs.town.town import Town
@@ -111,7 +109,7 @@ def _loaded(town_hash: str, name: str, opendrive: str, folder: Path) -> Town | N
     except (ValueError, KeyError):
         return None
     # Kernels look up numbers in these arrays unchecked, so they must be those that were written
-    if about.key != key or about.digest != _digest(stored):
+    if about.key != key or about.digest != arrays_digest(stored):
         return None
     return Town(
         name=name,
@@ -145,7 +143,7 @@ def store(town: Town, folder: Path | None = None) -> None:
     }
     about = {
         "key": key,
-        "digest": _digest(arrays),
+        "digest": arrays_digest(arrays),
         "road_names": town.road_names,
         "junction_names": town.junction_names,
         "geo_origin": town.geo_origin,
@@ -157,15 +155,6 @@ def store(town: Town, folder: Path | None = None) -> None:
         )
     except OSError as error:
         warn_not_kept(place, error)
-
-
-def _digest(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Names arrays with all that they hold."""
-    digest = hashlib.blake2b(digest_size=16)
-    for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode() + array.tobytes())
-    return digest.hexdigest()
 
 
 def freeze(town: Town) -> Town:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
+from di_envs.town.kept import kept
 from di_envs.town.lanes import LaneKind, Lanes
 from di_envs.town.once import once_a_town
 from di_envs.town.town import Town
@@ -50,6 +51,7 @@ class MapChunks(NamedTuple):
 
 
 @once_a_town
+@kept
 def map_chunks_of(town: Town) -> MapChunks:
     """The polylines of a town."""
     return build_map_chunks(town.lanes)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from di_envs.town.kept import kept
 from di_envs.town.lanes import Lanes
 from di_envs.town.once import once_a_town
 from di_envs.town.plan import RoutePlan
@@ -47,6 +48,7 @@ class TownTables:
 
 
 @once_a_town
+@kept
 def town_tables(town: Town) -> TownTables:
     """The tables of a town."""
     traffic = traffic_tables(town)

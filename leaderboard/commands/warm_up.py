@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from leaderboard.running.terminal import Terminal
 
-WARM_UP_HELP = """Compile the kernels and read the shipped maps, so that nobody waits later.
+WARM_UP_HELP = """Compile the kernels, read the shipped maps, plan their routes: nobody waits later.
 
 For images of containers, CI, and whoever would rather wait now: once for a version, a CPU and a
 Python. What is in the caches already is not done again. DRIVEINSIGHT_CACHE says where they are."""

@@ -18,7 +18,7 @@ from di_envs.config import OBSERVATION_GROUPS
 from di_envs.route_env import RouteEnv
 from di_envs.sensors.camera.config import rig_of
 from di_envs.sensors.lidar.config import lidar_of
-from di_envs.town.loading import SIDECARS, TOWNS, load_town
+from di_envs.suites import suite_names
 from di_envs.vector_env import RouteVectorEnv
 from leaderboard.running.bound import light_limited_bound
 
@@ -28,9 +28,9 @@ FEW: Mapping[str, Any] = MappingProxyType({"suite": "toy", "traffic": 4, "walker
 
 
 def read_maps() -> None:
-    """Reads every shipped map, with its lights."""
-    for town in TOWNS:
-        load_town(town, town if town in SIDECARS else None)
+    """Reads the map of every shipped suite, and works out what follows from it: routes, tables."""
+    for suite in suite_names():
+        RouteEnv(suite=suite, observations=("prompt",)).close()
 
 
 def drive_a_little() -> None:
@@ -60,7 +60,7 @@ def step_many() -> None:
 # What there is to do, by what it is for
 WORKS: Mapping[str, Callable[[], None]] = MappingProxyType(
     {
-        "the shipped maps": read_maps,
+        "the shipped maps and routes": read_maps,
         "a drive with every sensor": drive_a_little,
         "many worlds at once": step_many,
     }

@@ -9,7 +9,7 @@ from leaderboard.commands.cli import main
 def test_it_says_what_it_has_done_and_where_it_is_kept(capsys):
     assert main(["warm-up"]) == 0
     said = capsys.readouterr().out
-    for what in ("the shipped maps", "a drive with every sensor", "many worlds at once"):
+    for what in ("the shipped maps and routes", "a drive with every sensor", "many worlds at once"):
         assert f"{what}: " in said
     kept = caches.cache_folders("kernels")[0]
     assert str(kept.parent) in "".join(said.split("\n"))
