@@ -10,7 +10,6 @@ It needs Stable-Baselines3: `pip install -c constraints.txt -e ".[rl]"`. Seeds o
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +19,7 @@ import tyro
 from rich.progress import Progress
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 import di_envs  # noqa: F401 (registers the ids)
@@ -91,7 +91,7 @@ def make_learner(worlds: VecNormalize, training: Training) -> PPO:
         batch_size=512,
         n_epochs=6,
         gamma=0.99,
-        learning_rate=falling(6e-4),
+        learning_rate=LinearSchedule(6e-4, 6e-5, 1.0),
         policy_kwargs={
             "features_extractor_class": PromptFeatures,
             "net_arch": [128, 128],
@@ -105,11 +105,6 @@ def make_learner(worlds: VecNormalize, training: Training) -> PPO:
     # What the spaces do not tell whoever scores the model: how long an action was held.
     learner.driveinsight_options = {"control_dt_s": CONTROL_DT_S}
     return learner
-
-
-def falling(start: float) -> Callable[[float], float]:
-    """A learning rate that falls to a tenth."""
-    return lambda left: start * (0.1 + 0.9 * left)
 
 
 class Bar(BaseCallback):
