@@ -159,6 +159,7 @@ AGENTS: dict[str, AgentEntry] = {
         data="zoo/ppo/weights/ppo",
         data_files=("ppo.zip",),
         packages=("stable-baselines3", "torch"),
+        score="70.7",
     ),
     "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
     "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),

@@ -139,6 +139,7 @@ GOLDEN: dict[str, GoldenDrive] = {
     "transfuser on town05_short": GoldenDrive(
         agent="transfuser", suite="town05_short", route="8", seconds=2.0
     ),
+    "ppo on town05_short": GoldenDrive(agent="ppo", suite="town05_short", route="8", seconds=3.0),
     "roach-raster on town05_short": GoldenDrive(
         agent="roach-raster", suite="town05_short", route="8", seconds=3.0
     ),

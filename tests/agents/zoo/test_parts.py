@@ -114,7 +114,8 @@ def test_sizes_that_do_not_go_together_are_refused():
         RoachConfig(widths=(16, -3))
 
 
-def test_ppo_without_its_model_says_how_to_make_one():
+def test_ppo_without_its_model_says_how_to_make_one(monkeypatch):
+    monkeypatch.setattr("agents.zoo.ppo.agent.MODEL_FILE", "other.zip")
     with pytest.raises(AgentSpecError, match=r"not trained yet: python examples/train_ppo\.py"):
         PpoAgent(shipped="ppo")
 
