@@ -105,6 +105,7 @@ def _list(recipe: Recipe, output: Path) -> None:
 
 def _tell_done(recipe: Recipe, output: Path, goal: str | None) -> None:
     from agents.training.recipes.kinds import POLICY_FOLDER, Product
+    from agents.training.trainees import driver_of
 
     stages = recipe.needed_for(goal)
     policies = [stage for stage in stages if stage.how.makes == Product.POLICY]
@@ -112,5 +113,5 @@ def _tell_done(recipe: Recipe, output: Path, goal: str | None) -> None:
     if len(stages) < len(recipe.stages):
         say(f"Next: driveinsight train --recipe {recipe.path} --output {output}")
     elif policies:
-        policy = output / policies[-1].name / POLICY_FOLDER
-        say(f"Next: driveinsight evaluate --agent driveinsight:{policy} --suite town05_tiny")
+        agent = driver_of(output / policies[-1].name / POLICY_FOLDER)
+        say(f"Next: driveinsight evaluate --agent {agent} --suite town05_tiny")

@@ -116,3 +116,11 @@ def test_a_wrong_request_to_collect_says_what_to_do(arguments, told, capsys, tmp
     monkeypatch.chdir(tmp_path)
     assert main(["collect", *arguments]) == EXIT_USAGE
     assert told in capsys.readouterr().err
+
+
+def test_a_system_of_the_zoo_is_named_as_what_drives_it(recipe, capsys):
+    two_stages = SMALL.partition("[[stage]]\nrounds")[0]
+    recipe.write_text(two_stages.replace('config = "tiny"', 'config = "ego-only"'))
+    assert train(recipe, "--workers", "1") == 0
+    policy = recipe.parent / "run" / "policy-0" / "policy"
+    assert f"Next: driveinsight evaluate --agent zoo:{policy} --suite" in capsys.readouterr().out
