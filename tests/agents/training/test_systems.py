@@ -30,7 +30,7 @@ BY_HEART = TrainConfig(
     steps=30, batch=1, overfit=1, warm_up=5, learning_rate=3e-3, weight_decay=0.0
 )
 PAST = 1  # moments before it: more are more of the same
-STEPS = {"mile": 60}  # of those that draw what they believe
+STEPS = {"mile": 120}  # of those that draw what they believe
 # What falls far, but for the waypoints of the expert; a student has the points of its teacher
 LEARNT = {
     "roach-raster": ("waypoints", "action"),
