@@ -149,7 +149,10 @@ AGENTS: dict[str, AgentEntry] = {
         "interfuser", "interfuser:InterfuserAgent", "all views in a transformer, safety controller"
     ),
     "lbc-teacher": _system(
-        "lbc-teacher", "lbc:LbcAgent", "Learning by Cheating: who sees the truth and teaches lbc"
+        "lbc-teacher",
+        "lbc:LbcAgent",
+        "Learning by Cheating: who sees the truth and teaches lbc",
+        score="98.1",
     ),
     "ppo": AgentEntry(
         entry_point="agents.zoo.ppo.agent:PpoAgent",
@@ -161,7 +164,9 @@ AGENTS: dict[str, AgentEntry] = {
         packages=("stable-baselines3", "torch"),
         score="70.7",
     ),
-    "lbc": _system("lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras"),
+    "lbc": _system(
+        "lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras", score="41.8"
+    ),
     "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),
     "mile": _system("mile", "mile:MileAgent", "a model of the world, which can imagine too"),
     "st-p3": _system("st-p3", "st_p3:StP3Agent", "what comes as occupancy, and the cheapest path"),

@@ -140,6 +140,10 @@ GOLDEN: dict[str, GoldenDrive] = {
         agent="transfuser", suite="town05_short", route="8", seconds=2.0
     ),
     "ppo on town05_short": GoldenDrive(agent="ppo", suite="town05_short", route="8", seconds=3.0),
+    "lbc-teacher on town05_short": GoldenDrive(
+        agent="lbc-teacher", suite="town05_short", route="8", seconds=3.0
+    ),
+    "lbc on town05_short": GoldenDrive(agent="lbc", suite="town05_short", route="8", seconds=2.0),
     "roach-raster on town05_short": GoldenDrive(
         agent="roach-raster", suite="town05_short", route="8", seconds=3.0
     ),
