@@ -7,6 +7,7 @@ Untrained weights: they cost the same. CPU time of one core; prints and asserts 
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 import time
 from collections.abc import Callable
@@ -62,6 +63,9 @@ def measured(name: str, folder: Path) -> tuple[float, ...]:
 
 def main() -> None:
     """Prints a row for each configuration."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     torch.set_num_threads(1)
     torch.manual_seed(0)
     table = Table(title="ms of one core; 60 s: 600 decisions, one in five looked at [s]")

@@ -9,6 +9,7 @@ others on the machine make longer, and by that of the CPU; prints and asserts no
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import time
 from collections.abc import Callable
@@ -92,6 +93,9 @@ def measured(spec: str) -> tuple[int, dict[str, tuple[float, ...]]]:
 
 
 def main() -> None:
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     table = Table(title="ms without -> with a process of its own")
     for column in ("agent", "bytes seen", "decision, wall", "step, wall", "step, CPU of all"):
         table.add_column(column, justify="left" if column == "agent" else "right")

@@ -25,7 +25,7 @@ from di_envs.sensors.camera.cameras import CameraRig
 from di_envs.sensors.camera.config import RIGS
 from di_envs.sensors.lidar.config import LIDARS
 from di_envs.sensors.lidar.sweep import Lidar
-from di_envs.sensors.scene.scene import run_facts
+from di_envs.sensors.scene.scene import scene_of
 from di_envs.sensors.weather import weather_of
 from di_envs.town.loading import load_town
 from di_envs.world.world import World, WorldConfig
@@ -59,7 +59,7 @@ def milliseconds(
 def sensor_table(places: int, rounds: int, progress: Progress) -> Table:
     """Each rig in a few weathers, and each LiDAR."""
     town = load_town("town05")
-    run_facts(town)
+    scene_of(town)
     world = World(town, WorldConfig(vehicles=VEHICLES, walkers=WALKERS))
     world.reset(SEED, [])
     world.advance(np.zeros((0, 3)), WARM_UP_TICKS)

@@ -1,4 +1,4 @@
-"""The works that `step_rate.py` times: a drive replayed, crowds without an ego, many worlds.
+"""The works that `step_rate.py` times: a drive replayed, crowds without an ego, worlds, sensors.
 
 Run as a script it does them on demand, in a process of its own: so two checkouts can take turns.
 It imports only what versions of long ago have too.
@@ -35,6 +35,15 @@ CROWD_TICKS = 600
 # Steps a round, by how many worlds with an ego that stands are stepped in one thread; 1 is a single
 # environment
 STANDING = {1: 240, 16: 30, 64: 10}
+# Looks a round of each of `PLACES` vehicles, by the rig of cameras and the weather
+LOOKS = {
+    "small ClearNoon": 6,
+    "small HardRainNoon": 6,
+    "small ClearNight": 6,
+    "rl ClearNoon": 30,
+    "paper ClearNoon": 1,
+}
+PLACES = 12
 STAND = np.array([0.0, 0.0, 1.0], np.float32)
 
 # How many things a work does, and what does them
@@ -132,11 +141,41 @@ def standing(worlds: int, steps: int) -> Work:
     return worlds * steps, work
 
 
+def look_works() -> dict[str, Work]:
+    """Cameras' looks from the places of vehicles in turn, in town among others."""
+    from di_envs.sensors.camera.cameras import CameraRig
+    from di_envs.sensors.camera.config import RIGS
+    from di_envs.sensors.weather import weather_of
+
+    town = load_town("town05")
+    world = World(town, WorldConfig(vehicles=VEHICLES, walkers=WALKERS))
+    world.reset(SEED, ())
+    world.advance(np.zeros((0, 3)), round(WARM_UP_S / TICK_S))
+
+    def looks(name: str, count: int) -> Work:
+        rig, weather = name.split()
+        sensors = [
+            CameraRig(town, RIGS[rig], weather_of(weather), ego)
+            for ego in range(0, VEHICLES, VEHICLES // PLACES)
+        ]
+
+        def work() -> None:
+            for sensor in sensors:
+                sensor.start(world.view)
+                for _ in range(count):
+                    sensor.observe()
+
+        return count * len(sensors), work
+
+    return {name: looks(name, count) for name, count in LOOKS.items()}
+
+
 # What makes works, by the names of those that it makes
 MAKERS: dict[tuple[str, ...], Callable[[], dict[str, Work]]] = {
     ("world", "env"): lambda: drive_works(prompt_env()),
     tuple(f"{vehicles} | {walkers}" for vehicles, walkers in GROWTH): growth_works,
     tuple(str(worlds) for worlds in STANDING): standing_works,
+    tuple(LOOKS): look_works,
 }
 
 

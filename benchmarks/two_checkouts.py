@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from step_works import GROWTH, STANDING
+from step_works import GROWTH, LOOKS, STANDING
 from typing_extensions import Self
 
 WORKS = Path(__file__).with_name("step_works.py")
@@ -23,6 +23,7 @@ TITLES = {
     "world": "world tick, along a drive",
     "env": "`env.step`, observations `prompt`",
     **{f"{v} | {w}": f"world tick, {v} vehicles, {w} walkers, no ego" for v, w in GROWTH},
+    **{look: f"a look, cameras `{look.split()[0]}`, {look.split()[1]}" for look in LOOKS},
     **{str(n): f"a world's `step`, of {n} in a thread, standing" for n in STANDING},
 }
 

@@ -8,6 +8,7 @@ Time is the processor's, the median of `DECISIONS` after two that do not count, 
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -43,6 +44,9 @@ def cost_ms(name: str) -> tuple[int, float]:
 
 def main() -> None:
     """Prints a row for each system."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     print("| system | parameters | MB in float16 | ms a decision |\n|---|---:|---:|---:|")
     for name in system_names():
         size, milliseconds = cost_ms(name)

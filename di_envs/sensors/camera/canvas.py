@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt32
+from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt32, UInt64
 from di_envs.numerics.bundles import by_reference
 from di_envs.sensors.camera.config import STEEP_RAD, CameraConfig, Rig
 from di_envs.sensors.camera.projection import Camera, Projected
+from di_envs.sensors.camera.spans import BLOCK, whole
 from di_envs.sensors.scene.boxes import Boxes
 from di_envs.sensors.scene.scene import Scene
 from di_envs.sensors.weather import WeatherLook
@@ -26,19 +27,22 @@ class Canvas(NamedTuple):
     depth: Float32  # (H, W)
     tag: UInt8  # (H, W), or (0, W) where it is not asked for
     instance: Int32  # alike
-    red: Float32  # (W,)
+    # of the row: R is W and room for spans that end with a whole block, see `spans.py`
+    near: Float32  # (R,) depths
+    code: Int32  # (R,) 6 times the box's number and the face, -1 where there is no box
+    ends: UInt8  # (R,) whether a pixel is the last of a run of equal codes
+    end_words: UInt64  # (R // 8,) the same memory
+    red: Float32  # (R,)
     green: Float32
     blue: Float32
-    u: Float32  # places in the raster
-    v: Float32
-    samples: Float32  # (4, W + 2) colours and water before they are spread
-    texel: Int32  # (W + 2,) first one of four, in a level
-    share: Int32  # (W + 2,) between them
-    found: UInt32  # (4 W + 8,) texels
-    water: Float32  # (W,) how deep it stands on the ground
     shadow: Float32
-    last: UInt8
-    code: Int32
+    water: Float32  # (R,) how deep it stands on the ground
+    pattern: Float32  # (R,) of windows and leaves, or depths of samples
+    samples: Float32  # (4, R) colours and water before they are spread
+    texel: Int32  # (R,) first one of four, in a level
+    share: Int32  # (R,) between them
+    found: UInt32  # (4 R,) texels
+    untagged: UInt8  # (0,) for where no tags are asked for
 
 
 @by_reference
@@ -55,26 +59,30 @@ class Studio(NamedTuple):
 def canvas_of(camera: CameraConfig, rig: Rig) -> Canvas:
     """An empty canvas of a camera, with the images that the rig asks for."""
     height, width = camera.height, camera.width
-    rows = [np.zeros(width + 2, np.float32) for _ in range(7)]
+    room = whole(width) + 2 * BLOCK
+    near, red, green, blue, shadow, water, pattern = np.zeros((7, room), np.float32)
+    ends = np.zeros(room, np.uint8)
     return Canvas(
         cam=_camera_of(camera),
         rgb=np.zeros((height, 3 * width), np.uint8),
         depth=np.zeros((height, width), np.float32),
         tag=np.zeros((height if rig.semantic else 0, width), np.uint8),
         instance=np.zeros((height if rig.instance else 0, width), np.int32),
-        red=rows[0][:width],
-        green=rows[1][:width],
-        blue=rows[2][:width],
-        u=rows[3],
-        v=rows[4],
-        samples=np.zeros((4, width + 2), np.float32),
-        texel=np.zeros(width + 2, np.int32),
-        share=np.zeros(width + 2, np.int32),
-        found=np.zeros(4 * width + 8, np.uint32),
-        water=rows[6][:width],
-        shadow=rows[5][:width],
-        last=np.zeros(width, np.uint8),
-        code=np.zeros(width, np.int32),
+        near=near,
+        code=np.zeros(room, np.int32),
+        ends=ends,
+        end_words=ends.view(np.uint64),
+        red=red,
+        green=green,
+        blue=blue,
+        shadow=shadow,
+        water=water,
+        pattern=pattern,
+        samples=np.zeros((4, room), np.float32),
+        texel=np.zeros(room, np.int32),
+        share=np.zeros(room, np.int32),
+        found=np.zeros(4 * room, np.uint32),
+        untagged=np.zeros(0, np.uint8),
     )
 
 

@@ -11,6 +11,7 @@ from di_envs.numerics.kernels import kernel
 from di_envs.sensors.camera.canvas import Canvas, Studio
 from di_envs.sensors.camera.ground_shading import colour_by_raster
 from di_envs.sensors.camera.spans import (
+    RGB,
     Axis,
     blend,
     fill,
@@ -18,6 +19,7 @@ from di_envs.sensors.camera.spans import (
     haze_span,
     mottle,
     multiply,
+    whole,
     windows,
 )
 from di_envs.sensors.scene.boxes import Material
@@ -49,47 +51,53 @@ def colour_face(
         canvas: Painted on; its depths are known.
         code: 6 times the number of the box among those seen, and the face.
         a, b, y: The pixels.
-        tag: (W,) the row's tags: those of a deck are written, if the canvas has tags.
+        tag: (W,) the row's tags: those of a deck are written; (0,) where they are not asked for.
     """
     seen, look = studio.seen, studio.look
     source = seen.source[code // 6]
-    depth = canvas.depth[y, a:b]
     material = studio.boxes.material[source]
     face = code % 6
     haze = F(look.haze)
     if material == _LAMP:
         haze = F(0.25) * haze
-    red, green, blue = canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b]
     if material == _DECK and face == 4:
         _deck(studio, canvas, code, a, b, y, tag)
         return
-    sky_r, sky_g, sky_b = (
-        F(255.0 * look.horizon[0]),
-        F(255.0 * look.horizon[1]),
-        F(255.0 * look.horizon[2]),
-    )
+    end = a + whole(b - a)
+    red, green, blue = canvas.red[a:end], canvas.green[a:end], canvas.blue[a:end]
+    depth = canvas.near[a:end]
+    sky = _horizon(look)
     colour = seen.faces[code]
-    flat(red, depth, haze, colour[0], sky_r)
-    flat(green, depth, haze, colour[1], sky_g)
-    flat(blue, depth, haze, colour[2], sky_b)
+    flat(red, green, blue, depth, haze, (colour[0], colour[1], colour[2]), sky)
     if material != _WINDOWS and material != _FOLIAGE:
         return
     rays = seen.rays[code // 6]
     row, first, pixel = F(y), F(a), F(1.0 / canvas.cam.focal_px)
-    pattern = canvas.u[a:b]
+    pattern = canvas.pattern[a:end]
     side = 1 if face < 2 else 0
     along, up = _axis(rays, side, row), _axis(rays, 2, row)
     if material == _WINDOWS and face < 4:
         windows(pattern, depth, first, along, up, pixel)
         glow = F(255.0 * look.window_glow)
-        blend(red, pattern, F(0.13) * sky_r + F(12.0) + F(0.62) * glow)
-        blend(green, pattern, F(0.15) * sky_g + F(14.0) + F(0.48) * glow)
-        blend(blue, pattern, F(0.18) * sky_b + F(18.0) + F(0.25) * glow)
+        pane = (
+            F(0.13) * sky[0] + F(12.0) + F(0.62) * glow,
+            F(0.15) * sky[1] + F(14.0) + F(0.48) * glow,
+            F(0.18) * sky[2] + F(18.0) + F(0.25) * glow,
+        )
+        blend(red, green, blue, pattern, pane)
     elif material == _FOLIAGE:
         mottle(pattern, depth, first, along, up, _axis(rays, 1 - side, row), pixel)
-        multiply(red, pattern)
-        multiply(green, pattern)
-        multiply(blue, pattern)
+        multiply(red, green, blue, pattern)
+
+
+@kernel
+def _horizon(look: WeatherLook) -> RGB:
+    """The colour of the sky at the horizon, in levels."""
+    return (
+        F(255.0 * look.horizon[0]),
+        F(255.0 * look.horizon[1]),
+        F(255.0 * look.horizon[2]),
+    )
 
 
 @kernel
@@ -105,8 +113,11 @@ def _deck(studio: Studio, canvas: Canvas, code: int, a: int, b: int, y: int, tag
     over = seen.rays[code // 6, 0, 2] - studio.boxes.half[seen.source[code // 6], 2]
     colour_by_raster(canvas, studio.scene.deck, a, b, y, max(0.2, np.float64(over)), 0.0, tag)
     wet = 1.0 - 0.38 * look.wetness
-    depth = canvas.depth[y, a:b]
-    for q in range(3):
-        channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
-        light = wet * (look.ambient[q] + look.sun_colour[q] * look.sun[2])
-        haze_span(channel[a:b], depth, F(look.haze), F(light), F(255.0 * look.horizon[q]))
+    light = (
+        F(wet * (look.ambient[0] + look.sun_colour[0] * look.sun[2])),
+        F(wet * (look.ambient[1] + look.sun_colour[1] * look.sun[2])),
+        F(wet * (look.ambient[2] + look.sun_colour[2] * look.sun[2])),
+    )
+    end = a + whole(b - a)
+    red, green, blue = canvas.red[a:end], canvas.green[a:end], canvas.blue[a:end]
+    haze_span(red, green, blue, canvas.near[a:end], F(look.haze), light, _horizon(look))

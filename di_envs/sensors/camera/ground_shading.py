@@ -15,16 +15,15 @@ from di_envs.sensors.camera.canvas import Canvas, Studio
 from di_envs.sensors.camera.config import STEEP_RAD
 from di_envs.sensors.camera.raster_spans import (
     add_colours,
+    every,
     fetch,
-    last_bytes,
-    plane_points,
     puddles,
     spread,
-    tags_of,
+    tags_at,
     texel_places,
     water_depths,
 )
-from di_envs.sensors.camera.spans import Axis, fill, light_ground, shade_span
+from di_envs.sensors.camera.spans import RGB, Axis, fill, light_ground, shade_span, whole
 from di_envs.sensors.scene.raster import LEVELS, TEXEL_M, Raster
 from di_envs.sensors.weather import WeatherLook
 
@@ -44,7 +43,7 @@ def colour_ground(
         a, b, y: The pixels.
         far: Their depth [m].
         drop: How the row's rays rise, 1 ahead.
-        tag: (W,) the row's tags, written if the canvas has tags.
+        tag: (W,) the row's tags, written; (0,) where they are not asked for.
     """
     water_level = 0.0
     if studio.look.puddles > 0.0:
@@ -76,12 +75,12 @@ def colour_by_raster(
         a, b, y: The pixels [a, b) of row y.
         over: How far below the camera the raster lies [m].
         water_level: Up to where there are puddles, 0 for none; their depths go to `canvas.water`.
-        tag: (W,) the row's tags, written if the canvas has tags.
+        tag: (W,) the row's tags, written; (0,) where they are not asked for.
     """
     cam = canvas.cam
     focal = cam.focal_px
     v = (y + 0.5 - cam.cy_px) / focal
-    depth = canvas.depth[y, a:b]
+    depth = canvas.near[a:b]
     middle = np.float64(depth[(b - a) // 2])
     right = cam.right
     gx, gy = cam.ahead[0] + v * cam.down[0], cam.ahead[1] + v * cam.down[1]
@@ -93,42 +92,43 @@ def colour_by_raster(
     stride = 1
     while stride < 8 and wide * stride * 3.0 <= TEXEL_M * (1 << level):
         stride *= 2
-    n = b - a if stride == 1 else (b - a - 1) // stride + 2
-    u, w, index, share = canvas.u[:n], canvas.v[:n], canvas.texel[:n], canvas.share[:n]
-    red, green, blue = canvas.samples[0, :n], canvas.samples[1, :n], canvas.samples[2, :n]
-    water = canvas.samples[3, :n]
+    end = a + whole(b - a)
+    count = b - a if stride == 1 else (b - a - 1) // stride + 2
+    n = end - a if stride == 1 else whole((end - a) // stride + 1)
+    index, share = canvas.texel[:n], canvas.share[:n]
     if stride == 1:
-        red, green, blue = canvas.red[a:b], canvas.green[a:b], canvas.blue[a:b]
-        water = canvas.water[a:b]
-    fill(red, F(0.0))
-    fill(green, F(0.0))
-    fill(blue, F(0.0))
+        z = canvas.near[a:end]
+        red, green, blue = canvas.red[a:end], canvas.green[a:end], canvas.blue[a:end]
+        water = canvas.water[a:end]
+    else:
+        z = canvas.pattern[:n]
+        every(depth, stride, count, z)
+        red, green, blue = canvas.samples[0, :n], canvas.samples[1, :n], canvas.samples[2, :n]
+        water = canvas.samples[3, :n]
     u0 = (0.5 - cam.cx_px) / focal
     x0, y0 = cam.eye[0] - raster.origin[0], cam.eye[1] - raster.origin[1]
     start, width, height = raster.start[level], raster.width[level], raster.height[level]
     for tap in range(taps):
         shift = ((tap + 0.5) / taps - 0.5) * long / max(flat_m, 1e-9)
-        axis = _axis(x0 + shift * gx, gx + u0 * right[0], right[0] / focal)
-        plane_points(u, depth, stride, axis, F(a))
-        axis = _axis(y0 + shift * gy, gy + u0 * right[1], right[1] / focal)
-        plane_points(w, depth, stride, axis, F(a))
-        texel_places(u, w, index, share, width, height, F(1.0 / (1 << level)))
-        fetch(index, canvas.found, raster.texels, start, width)
-        add_colours(canvas.found, share, red, green, blue, F(1.0 / taps))
+        across = _axis(x0 + shift * gx, gx + u0 * right[0], right[0] / focal)
+        down = _axis(y0 + shift * gy, gy + u0 * right[1], right[1] / focal)
+        scale = F(1.0 / (1 << level))
+        texel_places(z, stride, F(a), across, down, index, share, width, height, scale)
+        fetch(index[:count], canvas.found, raster.texels, start, width)
+        add_colours(canvas.found, share, red, green, blue, F(1.0 / taps), tap > 0)
         if water_level > 0.0 and tap == taps // 2:
             water_depths(canvas.found, share, water, F(water_level))
     if stride > 1:
-        spread(red, canvas.red[a:b], stride)
-        spread(green, canvas.green[a:b], stride)
-        spread(blue, canvas.blue[a:b], stride)
+        spread(red, canvas.red[a:end], stride)
+        spread(green, canvas.green[a:end], stride)
+        spread(blue, canvas.blue[a:end], stride)
         if water_level > 0.0:
-            spread(water, canvas.water[a:b], stride)
-    if canvas.tag.shape[0] > 0:
-        u, w = canvas.u[: b - a], canvas.v[: b - a]
-        plane_points(u, depth, 1, _axis(x0, gx + u0 * right[0], right[0] / focal), F(a))
-        plane_points(w, depth, 1, _axis(y0, gy + u0 * right[1], right[1] / focal), F(a))
-        last_bytes(u, w, canvas.last[a:b], raster.texels, raster.width[0], raster.height[0])
-        tags_of(canvas.last[a:b], tag[a:b])
+            spread(water, canvas.water[a:end], stride)
+    if tag.shape[0] > 0:
+        across = _axis(x0, gx + u0 * right[0], right[0] / focal)
+        down = _axis(y0, gy + u0 * right[1], right[1] / focal)
+        width, height = raster.width[0], raster.height[0]
+        tags_at(depth, F(a), across, down, tag[a:b], raster.texels, width, height)
 
 
 @kernel
@@ -156,7 +156,7 @@ def shade_row(studio: Studio, canvas: Canvas, v: float, far: float) -> None:
     """
     cam, seen = canvas.cam, studio.seen
     fill(canvas.shadow, F(0.0))
-    width = canvas.shadow.shape[0]
+    width = canvas.depth.shape[1]
     focal, ahead, right, down = cam.focal_px, cam.ahead, cam.right, cam.down
     u0 = (0.5 - cam.cx_px) / focal
     x0 = far * (ahead[0] + u0 * right[0] + v * down[0])
@@ -175,7 +175,7 @@ def shade_row(studio: Studio, canvas: Canvas, v: float, far: float) -> None:
         start, end = _within_strips(seen.strips[k], (x0, y0), (dx, dy), width)
         if end > start:
             first = max(0, math.floor(start))
-            stop = min(width, math.ceil(end) + 1)
+            stop = first + whole(min(width, math.ceil(end) + 1) - first)
             shade_span(
                 canvas.shadow[first:stop], F(first), F(start), F(end), F(min(1.0, wide_m / long))
             )
@@ -225,26 +225,33 @@ def _light_plane(
     graze = (1.0 - steep) ** 3
     mirror = look.wetness * 0.5 * graze
     dim = (1.0 - 0.38 * look.wetness) * (1.0 - mirror) * clear
-    for q in range(3):
-        sun = look.sun_colour[q] * look.sun[2]
-        lit = dim * (look.ambient[q] + sun)
-        dark = dim * (0.70 * look.ambient[q] + sun * (1.0 - look.shadow))
-        sky = 255.0 * (look.horizon[q] * (1.0 - steep) + look.zenith[q] * steep)
-        add = 255.0 * look.horizon[q] * (1.0 - clear) + sky * mirror * clear
-        channel = canvas.red if q == 0 else (canvas.green if q == 1 else canvas.blue)
-        light_ground(channel[a:b], canvas.shadow[a:b], F(lit), F(dark), F(add))
+    end = a + whole(b - a)
+    red, green, blue = canvas.red[a:end], canvas.green[a:end], canvas.blue[a:end]
+    of_r = _plane_light(look, 0, clear, steep, mirror, dim)
+    of_g = _plane_light(look, 1, clear, steep, mirror, dim)
+    of_b = _plane_light(look, 2, clear, steep, mirror, dim)
+    lit = (of_r[0], of_g[0], of_b[0])
+    dark = (of_r[1], of_g[1], of_b[1])
+    add = (of_r[2], of_g[2], of_b[2])
+    light_ground(red, green, blue, canvas.shadow[a:end], lit, dark, add)
     if look.puddles > 0.0:
         share = F((0.25 + 0.6 * graze) * clear)
-        sky_colour = (
+        sky = (
             F(235.0 * look.horizon[0]),
             F(235.0 * look.horizon[1]),
             F(235.0 * look.horizon[2]),
         )
-        puddles(
-            canvas.water[a:b],
-            canvas.red[a:b],
-            canvas.green[a:b],
-            canvas.blue[a:b],
-            share,
-            sky_colour,
-        )
+        puddles(canvas.water[a:end], red, green, blue, share, sky)
+
+
+@kernel
+def _plane_light(
+    look: WeatherLook, channel: int, clear: float, steep: float, mirror: float, dim: float
+) -> RGB:
+    """By what a channel of ground is lit in the sun and in shadow, and what haze and wet add."""
+    sun = look.sun_colour[channel] * look.sun[2]
+    lit = dim * (look.ambient[channel] + sun)
+    dark = dim * (0.70 * look.ambient[channel] + sun * (1.0 - look.shadow))
+    sky = 255.0 * (look.horizon[channel] * (1.0 - steep) + look.zenith[channel] * steep)
+    add = 255.0 * look.horizon[channel] * (1.0 - clear) + sky * mirror * clear
+    return F(lit), F(dark), F(add)

@@ -20,8 +20,10 @@ from di_envs.world.state import State
 
 NEAR = 0.1  # m; nothing nearer is seen
 SMALLEST_PX = 0.7  # boxes that look smaller are left out, unless they shine
+_SURELY_M = 0.001  # beyond the near plane, whatever rounding does
 _GROWN_PX = 0.02  # a ray is traced in single precision: it may meet a box by a hair beside it
 _LAMP_GROWN_PX = 1.0  # a lamp blooms where it covers no pixel's middle
+_BESIDE_PX = 3.0  # a box that lies further beside the image has no pixel, however it has grown
 _LAMP = int(Material.LAMP)
 
 
@@ -109,6 +111,8 @@ def project_boxes(
     axes = np.zeros((3, 3))  # of the box, in the world frame
     rel = np.zeros(3)
     in_cam = np.zeros((4, 3))  # middle, then the three half sides: ahead, right, down
+    wide = (0.5 * width + _BESIDE_PX) / cam.focal_px  # how far to a side is seen, 1 ahead
+    over_wide = math.sqrt(1.0 + wide * wide)
     for b in range(boxes.count[0]):
         radius2 = 0.0
         for k in range(3):
@@ -119,6 +123,9 @@ def project_boxes(
         if ahead + radius < NEAR:
             continue
         if radius * cam.focal_px < SMALLEST_PX * ahead and boxes.material[b] != _LAMP:
+            continue
+        right = rel[0] * cam.right[0] + rel[1] * cam.right[1]  # the camera does not roll
+        if abs(right) - radius * over_wide > wide * ahead:
             continue
         _axes_of(boxes, b, axes)
         _into_camera(cam.axes, rel, axes, boxes.half[b], in_cam)
@@ -156,8 +163,7 @@ def _into_camera(
 @kernel
 def _axes_of(boxes: Boxes, b: int, axes: Float64) -> None:
     """Writes a box's axes ahead, right and up in the world frame, (3, 3) in rows."""
-    yaw, pitch = np.float64(boxes.yaw[b]), np.float64(boxes.pitch[b])
-    c, s = math.cos(yaw), math.sin(yaw)
+    c, s, pitch = boxes.turn[b, 0], boxes.turn[b, 1], np.float64(boxes.pitch[b])
     cp, sp = 1.0, 0.0
     if pitch != 0.0:
         cp, sp = math.cos(pitch), math.sin(pitch)
@@ -180,6 +186,8 @@ def _bounds(box: Float64, cam: Camera, width: int, height: int, grown: float, re
     """
     focal, cx, cy = cam.focal_px, cam.cx_px, cam.cy_px
     low_x, high_x, low_y, high_y = 1e9, -1e9, 1e9, -1e9
+    nearest = box[0, 0] - abs(box[1, 0]) - abs(box[2, 0]) - abs(box[3, 0])
+    cut = nearest < NEAR + _SURELY_M
     for corner in range(8):
         a = 1.0 if corner & 1 else -1.0
         r = 1.0 if corner & 2 else -1.0
@@ -187,18 +195,21 @@ def _bounds(box: Float64, cam: Camera, width: int, height: int, grown: float, re
         z = box[0, 0] + a * box[1, 0] + r * box[2, 0] + u * box[3, 0]
         x = box[0, 1] + a * box[1, 1] + r * box[2, 1] + u * box[3, 1]
         y = box[0, 2] + a * box[1, 2] + r * box[2, 2] + u * box[3, 2]
-        if z >= NEAR:
-            low_x, high_x = min(low_x, x / z), max(high_x, x / z)
-            low_y, high_y = min(low_y, y / z), max(high_y, y / z)
-            for side in range(3):
-                sign = -2.0 * (a if side == 0 else (r if side == 1 else u))
-                z2 = z + sign * box[1 + side, 0]
-                if z2 < NEAR:
-                    t = (NEAR - z) / (z2 - z)
-                    x2 = (x + t * sign * box[1 + side, 1]) / NEAR
-                    y2 = (y + t * sign * box[1 + side, 2]) / NEAR
-                    low_x, high_x = min(low_x, x2), max(high_x, x2)
-                    low_y, high_y = min(low_y, y2), max(high_y, y2)
+        if cut and z < NEAR:
+            continue
+        low_x, high_x = min(low_x, x / z), max(high_x, x / z)
+        low_y, high_y = min(low_y, y / z), max(high_y, y / z)
+        if not cut:
+            continue
+        for side in range(3):
+            sign = -2.0 * (a if side == 0 else (r if side == 1 else u))
+            z2 = z + sign * box[1 + side, 0]
+            if z2 < NEAR:
+                t = (NEAR - z) / (z2 - z)
+                x2 = (x + t * sign * box[1 + side, 1]) / NEAR
+                y2 = (y + t * sign * box[1 + side, 2]) / NEAR
+                low_x, high_x = min(low_x, x2), max(high_x, x2)
+                low_y, high_y = min(low_y, y2), max(high_y, y2)
     if high_x < low_x:
         return False
     rect[0] = math.ceil(min(max(cx + focal * low_x - 0.5 - grown, 0.0), width * 1.0))

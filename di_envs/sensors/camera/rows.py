@@ -16,14 +16,18 @@ from di_envs.sensors.camera.ground_shading import colour_ground, shade_row
 from di_envs.sensors.camera.projection import Projected, place_camera, project_boxes
 from di_envs.sensors.camera.shadows import project_shadows
 from di_envs.sensors.camera.spans import (
+    BLOCK,
     BoxRays,
     beam_span,
+    copy,
     fill,
     hit_box,
     hit_upright,
+    mark_ends,
     multiply,
     run_end,
     store_row,
+    whole,
 )
 from di_envs.sensors.scene.tags import Tag
 
@@ -77,7 +81,8 @@ def _rows_of_boxes(seen: Projected, height: int) -> tuple[Int64, Int32]:
 def _row(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> None:
     """Takes row y of pixels, on which these boxes may be, by their numbers among those seen."""
     cam = canvas.cam
-    depth = canvas.depth[y]
+    width = canvas.depth.shape[1]
+    depth = canvas.near
     v = (y + 0.5 - cam.cy_px) / cam.focal_px  # how far down the row's rays go, 1 ahead
     drop = cam.ahead[2] + v * cam.down[2]  # of the rays, upwards, 1 ahead
     above = cam.eye[2] - studio.scene.base_z[0]
@@ -88,12 +93,16 @@ def _row(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> None:
     low, high = _hit_boxes(studio, canvas, y, boxes)
     if ground:
         shade_row(studio, canvas, v, far)
-    x, width = 0, depth.shape[0]
+    copy(canvas.depth[y], depth)
+    marked = max(0, low - 1)  # boxes cover columns of [low, high) at most
+    marked -= marked % BLOCK
+    mark_ends(canvas.code[marked:], canvas.ends[marked : whole(high)])
+    x = 0
     while x < width:
         code = canvas.code[x]
         end = width
-        if x < high:  # boxes cover columns of [low, high) at most
-            end = run_end(canvas.code, max(x, low - 1), high)
+        if x < high:
+            end = run_end(canvas.ends, canvas.end_words, max(x, low - 1), high)
             if end == high and code < 0:
                 end = width
         if code < 0:
@@ -102,7 +111,7 @@ def _row(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> None:
             _colour_box(studio, canvas, code, x, end, y)
         x = end
     if cam.beam > 0.0 and studio.look.night > 0:
-        _shine(canvas, depth)
+        _shine(canvas, width)
     store_row(canvas.red, canvas.green, canvas.blue, canvas.rgb[y])
 
 
@@ -121,7 +130,7 @@ def _colour_open(
     """
     if canvas.instance.shape[0] > 0:
         fill(canvas.instance[y, a:b], np.int32(0))
-    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.last
+    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.untagged
     if far > 0.0:
         colour_ground(studio, canvas, a, b, y, far, drop, tag)
         return
@@ -136,39 +145,38 @@ def _colour_box(studio: Studio, canvas: Canvas, code: int, a: int, b: int, y: in
     source = studio.seen.source[code // 6]
     if canvas.instance.shape[0] > 0:
         fill(canvas.instance[y, a:b], studio.boxes.instance[source])
-    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.last
+    tag = canvas.tag[y] if canvas.tag.shape[0] > 0 else canvas.untagged
     if canvas.tag.shape[0] > 0:
         fill(tag[a:b], studio.boxes.tag[source])
     colour_face(studio, canvas, code, a, b, y, tag)
 
 
 @kernel
-def _shine(canvas: Canvas, depth: Float32) -> None:
-    """Brightens a row of depths (W,) by the ego's own headlights."""
-    cam = canvas.cam
+def _shine(canvas: Canvas, width: int) -> None:
+    """Brightens the row by the ego's own headlights."""
+    cam, end = canvas.cam, whole(width)
     u0, du = F((0.5 - cam.cx_px) / cam.focal_px), F(1.0 / cam.focal_px)
-    beam_span(canvas.shadow, depth, F(6.0 * cam.beam), u0, du)
-    multiply(canvas.red, canvas.shadow)
-    multiply(canvas.green, canvas.shadow)
-    multiply(canvas.blue, canvas.shadow)
+    beam_span(canvas.shadow[:end], canvas.near[:end], F(6.0 * cam.beam), u0, du)
+    multiply(canvas.red[:end], canvas.green[:end], canvas.blue[:end], canvas.shadow[:end])
 
 
 @kernel
 def _hit_boxes(studio: Studio, canvas: Canvas, y: int, boxes: Int32) -> tuple[int, int]:
     """Finds the nearest face at each pixel of a row; returns the columns that boxes may cover."""
     seen, row = studio.seen, F(y)
-    low, high = canvas.code.shape[0], 0
-    depth = canvas.depth[y]
+    low, high = canvas.depth.shape[1], 0
     for n in range(boxes.shape[0]):
         k = boxes[n]
         a, b = seen.rect[k, 0], seen.rect[k, 1]
         low, high = min(low, a), max(high, b)
         box = seen.source[k]
         rays = _rays_of_row(seen.rays[k], row, studio.boxes.half[box])
+        end = a + whole(b - a)
+        depth, code = canvas.near[a:end], canvas.code[a:end]
         if studio.boxes.pitch[box] == F(0.0):
-            hit_upright(depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), rays)
+            hit_upright(depth, code, F(a), F(b), np.int32(6 * k), rays)
         else:
-            hit_box(depth[a:b], canvas.code[a:b], F(a), np.int32(6 * k), rays)
+            hit_box(depth, code, F(a), F(b), np.int32(6 * k), rays)
     return low, high
 
 

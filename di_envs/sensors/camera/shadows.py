@@ -75,7 +75,7 @@ def _shadow(
     fall_x, fall_y = fall
     steep = math.hypot(fall_x, fall_y)
     hx, hy = np.float64(boxes.half[b, 0]), np.float64(boxes.half[b, 1])
-    c, s = math.cos(np.float64(boxes.yaw[b])), math.sin(np.float64(boxes.yaw[b]))
+    c, s = boxes.turn[b, 0], boxes.turn[b, 1]
     x = boxes.centre[b, 0] - cam.eye[0] + fall_x * bottom
     y = boxes.centre[b, 1] - cam.eye[1] + fall_y * bottom
     long_x, long_y = fall_x * (top - bottom), fall_y * (top - bottom)

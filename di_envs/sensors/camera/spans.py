@@ -1,8 +1,12 @@
 """The innermost loops of the cameras: small functions over slices of one row of pixels.
 
 Each works on contiguous single-precision slices from 0 on and calls nothing, which is what lets
-LLVM vectorise it. Colours are in levels (0..255) until `store_row`. `depth` is metres ahead of the
-camera's plane; a pixel's place along the row is `first + index`. Slices are (N,), N pixels long.
+LLVM vectorise it. Slices are (N,), N pixels, of whole blocks of `BLOCK`: a rest that is worked out
+pixel by pixel costs more than most spans are long. What lies beyond a span's end in its last block
+is left as it was, or is painted over, as rows are painted from left to right.
+
+Colours are in levels (0..255) until `store_row`. `depth` is metres ahead of the camera's plane; a
+pixel's place along the row is `first + index`.
 """
 
 from __future__ import annotations
@@ -12,12 +16,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.arrays import Float32, Int32, UInt8
+from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt64
 from di_envs.numerics.kernels import kernel
 
 F = np.float32
 ONE, ZERO, HALF, FULL = F(1.0), F(0.0), F(0.5), F(255.0)
 NEAR_M = F(0.1)
+_ALL, _ONE, _TOP = np.uint64(2**64 - 1), np.uint64(1), np.uint64(56)
+_NUMBERS = np.uint64(0x0001020304050607)
+BLOCK = 8  # pixels; the loops say so to LLVM by ending at `N // BLOCK * BLOCK`
+
+
+RGB = tuple[F, F, F]  # of one colour, in levels, or what multiplies them
 
 
 class BoxRays(NamedTuple):
@@ -49,13 +59,20 @@ class Axis(NamedTuple):
 
 
 @kernel
-def hit_box(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays) -> None:
+def whole(pixels: int) -> int:
+    """So many pixels, rounded up to whole blocks."""
+    return (pixels + (BLOCK - 1)) // BLOCK * BLOCK
+
+
+@kernel
+def hit_box(depth: Float32, code: Int32, first: F, end: F, box: np.int32, rays: BoxRays) -> None:
     """Intersects a span of rays with one box; the nearer hit stays.
 
     Args:
         depth: (N,) nearest hit so far.
         code: (N,) what it was: 6 times the box's number and the face.
         first: Column of the span's first pixel.
+        end: Column of the first one beyond it, from where on nothing is hit.
         box: 6 times the box's number.
         rays: Of the row.
     """
@@ -64,7 +81,7 @@ def hit_box(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays)
     nz, pz = -rays.half_z - rays.eye_z, rays.half_z - rays.eye_z
     ax, ay, az = rays.start_x, rays.start_y, rays.start_z
     bx, by, bz = rays.step_x, rays.step_y, rays.step_z
-    for x in range(depth.shape[0]):
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         at = F(x) + first
         old = depth[x]
         old_code = code[x]
@@ -83,7 +100,7 @@ def hit_box(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays)
         enter = in_x if in_x > enter else enter
         leave = out_y if out_y < out_z else out_z
         leave = out_x if out_x < leave else leave
-        hit = (enter <= leave) & (enter > NEAR_M) & (enter < old)
+        hit = (enter <= leave) & (enter > NEAR_M) & (enter < old) & (at < end)
         face_x = np.int32(dx >= ZERO)
         face_y = np.int32(2) + np.int32(dy >= ZERO)
         face_z = np.int32(4) + np.int32(dz >= ZERO)
@@ -93,7 +110,9 @@ def hit_box(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays)
 
 
 @kernel
-def hit_upright(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxRays) -> None:
+def hit_upright(
+    depth: Float32, code: Int32, first: F, end: F, box: np.int32, rays: BoxRays
+) -> None:
     """`hit_box` for a box without pitch: a row's rays rise alike at every column."""
     nx, px = -rays.half_x - rays.eye_x, rays.half_x - rays.eye_x
     ny, py = -rays.half_y - rays.eye_y, rays.half_y - rays.eye_y
@@ -104,7 +123,7 @@ def hit_upright(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxR
     in_z = z1 if z1 < z2 else z2
     out_z = z2 if z1 < z2 else z1
     face_z = np.int32(4) + np.int32(dz >= ZERO)
-    for x in range(depth.shape[0]):
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         at = F(x) + first
         old = depth[x]
         old_code = code[x]
@@ -120,7 +139,7 @@ def hit_upright(depth: Float32, code: Int32, first: F, box: np.int32, rays: BoxR
         enter = in_x if in_x > enter else enter
         leave = out_y if out_y < out_z else out_z
         leave = out_x if out_x < leave else leave
-        hit = (enter <= leave) & (enter > NEAR_M) & (enter < old)
+        hit = (enter <= leave) & (enter > NEAR_M) & (enter < old) & (at < end)
         face_x = np.int32(dx >= ZERO)
         face_y = np.int32(2) + np.int32(dy >= ZERO)
         face = face_x if enter == in_x else (face_y if enter == in_y else face_z)
@@ -136,10 +155,25 @@ def fill(values: NDArray[Any], value: Any) -> None:
 
 
 @kernel
-def light_ground(colour: Float32, shadow: Float32, lit: F, dark: F, add: F) -> None:
-    """Lights one channel of a span of ground: by `lit`, in shadow by `dark`, and adds haze."""
-    for x in range(colour.shape[0]):
-        colour[x] = colour[x] * (lit + (dark - lit) * shadow[x]) + add
+def copy(values: Float32, source: Float32) -> None:
+    """Copies a span of any length."""
+    for x in range(values.shape[0]):
+        values[x] = source[x]
+
+
+@kernel
+def light_ground(
+    red: Float32, green: Float32, blue: Float32, shadow: Float32, lit: RGB, dark: RGB, add: RGB
+) -> None:
+    """Lights a span of ground: by `lit`, in shadow by `dark`, and adds haze."""
+    lit_r, lit_g, lit_b = lit
+    r, g, b = dark[0] - lit_r, dark[1] - lit_g, dark[2] - lit_b
+    add_r, add_g, add_b = add
+    for x in range(shadow.shape[0] // BLOCK * BLOCK):
+        k = shadow[x]
+        red[x] = red[x] * (lit_r + r * k) + add_r
+        green[x] = green[x] * (lit_g + g * k) + add_g
+        blue[x] = blue[x] * (lit_b + b * k) + add_b
 
 
 @kernel
@@ -153,7 +187,7 @@ def shade_span(shadow: Float32, first: F, start: F, end: F, strength: F) -> None
         end: Column at which it ends.
         strength: 0..1, less for what is thinner than a pixel.
     """
-    for x in range(shadow.shape[0]):
+    for x in range(shadow.shape[0] // BLOCK * BLOCK):
         at = first + F(x)
         a, b = at - start + HALF, end - at + HALF
         k = a if a < b else b
@@ -162,12 +196,18 @@ def shade_span(shadow: Float32, first: F, start: F, end: F, strength: F) -> None
 
 
 @kernel
-def flat(colour: Float32, depth: Float32, haze: F, value: F, sky: F) -> None:
-    """One channel of a plain face of colour `value`, behind `haze` [1/m] of colour `sky`."""
-    for x in range(depth.shape[0]):
+def flat(
+    red: Float32, green: Float32, blue: Float32, depth: Float32, haze: F, colour: RGB, sky: RGB
+) -> None:
+    """A span of a plain face of one colour, behind `haze` [1/m] of the colour of the sky."""
+    sky_r, sky_g, sky_b = sky
+    r, g, b = colour[0] - sky_r, colour[1] - sky_g, colour[2] - sky_b
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         k = haze * depth[x]
         w = ONE / (ONE + k + HALF * k * k)
-        colour[x] = sky + (value - sky) * w
+        red[x] = sky_r + r * w
+        green[x] = sky_g + g * w
+        blue[x] = sky_b + b * w
 
 
 @kernel
@@ -182,7 +222,7 @@ def windows(pattern: Float32, depth: Float32, first: F, along: Axis, up: Axis, p
         up: Height on the wall [m].
         pixel: Metres a pixel at 1 m.
     """
-    for x in range(depth.shape[0]):
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         at = F(x) + first
         q = (along.start + depth[x] * (along.gain + at * along.turn)) / F(2.8)
         p = (up.start + depth[x] * (up.gain + at * up.turn)) / F(3.2)
@@ -205,55 +245,70 @@ def mottle(
     pattern: Float32, depth: Float32, first: F, along: Axis, up: Axis, across: Axis, pixel: F
 ) -> None:
     """How bright the leaves are at each pixel, around 1. Arguments as for `windows`."""
-    for x in range(depth.shape[0]):
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         at = F(x) + first
-        q = np.int64(np.floor((along.start + depth[x] * (along.gain + at * along.turn)) * F(2.7)))
-        p = np.int64(np.floor((up.start + depth[x] * (up.gain + at * up.turn)) * F(2.7)))
-        s = np.int64(
+        q = np.int32(np.floor((along.start + depth[x] * (along.gain + at * along.turn)) * F(2.7)))
+        p = np.int32(np.floor((up.start + depth[x] * (up.gain + at * up.turn)) * F(2.7)))
+        s = np.int32(
             np.floor((across.start + depth[x] * (across.gain + at * across.turn)) * F(2.7))
         )
-        h = (q * 73856093) ^ (p * 19349663) ^ (s * 83492791)
-        h = (((h & 0xFFFFFF) * 40503) >> 12) & 255
+        # of the products the low 32 bits count, so that eight of them fill a vector
+        h = np.uint32(np.uint32(q * 73856093) ^ np.uint32(p * 19349663))
+        h = np.uint32(np.uint32(h ^ np.uint32(s * 83492791)) & np.uint32(0xFFFFFF))
+        h = np.uint32(np.uint32(np.uint32(h * np.uint32(40503)) >> np.uint32(12)) & np.uint32(255))
         fade = F(1.3) - depth[x] * pixel * F(2.5)
         fade = fade if fade > ZERO else ZERO
         fade = fade if fade < ONE else ONE
-        pattern[x] = ONE + (F(h) / F(255.0) - HALF) * F(0.65) * fade
+        pattern[x] = ONE + (F(np.int32(h)) / F(255.0) - HALF) * F(0.65) * fade
 
 
 @kernel
-def blend(colour: Float32, pattern: Float32, other: F) -> None:
-    """Mixes another value into a channel, by a pattern of shares 0..1."""
-    for x in range(colour.shape[0]):
-        colour[x] += (other - colour[x]) * pattern[x]
+def blend(red: Float32, green: Float32, blue: Float32, pattern: Float32, other: RGB) -> None:
+    """Mixes another colour into a span, by a pattern of shares 0..1."""
+    r, g, b = other
+    for x in range(pattern.shape[0] // BLOCK * BLOCK):
+        k = pattern[x]
+        red[x] += (r - red[x]) * k
+        green[x] += (g - green[x]) * k
+        blue[x] += (b - blue[x]) * k
 
 
 @kernel
-def multiply(colour: Float32, pattern: Float32) -> None:
-    """Multiplies a channel by a pattern."""
-    for x in range(colour.shape[0]):
-        colour[x] *= pattern[x]
+def multiply(red: Float32, green: Float32, blue: Float32, pattern: Float32) -> None:
+    """Multiplies a span of colours by a pattern."""
+    for x in range(pattern.shape[0] // BLOCK * BLOCK):
+        k = pattern[x]
+        red[x] *= k
+        green[x] *= k
+        blue[x] *= k
 
 
 @kernel
-def haze_span(colour: Float32, depth: Float32, haze: F, light: F, sky: F) -> None:
-    """Lights one channel of a textured face and hides it in `haze` [1/m] of colour `sky`."""
-    for x in range(depth.shape[0]):
+def haze_span(
+    red: Float32, green: Float32, blue: Float32, depth: Float32, haze: F, light: RGB, sky: RGB
+) -> None:
+    """Lights a span of a textured face and hides it in `haze` [1/m] of the colour of the sky."""
+    light_r, light_g, light_b = light
+    sky_r, sky_g, sky_b = sky
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         k = haze * depth[x]
         w = ONE / (ONE + k + HALF * k * k)
-        colour[x] = sky + (colour[x] * light - sky) * w
+        red[x] = sky_r + (red[x] * light_r - sky_r) * w
+        green[x] = sky_g + (green[x] * light_g - sky_g) * w
+        blue[x] = sky_b + (blue[x] * light_b - sky_b) * w
 
 
 @kernel
 def store_row(red: Float32, green: Float32, blue: Float32, row: UInt8) -> None:
-    """Writes N colours as bytes to a row of an image, (3 N,)."""
-    for x in range(red.shape[0]):
+    """Writes a row's colours as bytes to that of an image, (3 W,)."""
+    for x in range(row.shape[0] // 3):
         r, g, b = red[x], green[x], blue[x]
         r = r if r < FULL else FULL
         g = g if g < FULL else FULL
         b = b if b < FULL else FULL
-        row[3 * x] = np.uint8(r)
-        row[3 * x + 1] = np.uint8(g)
-        row[3 * x + 2] = np.uint8(b)
+        row[3 * x] = np.uint8(np.int32(r))
+        row[3 * x + 1] = np.uint8(np.int32(g))
+        row[3 * x + 2] = np.uint8(np.int32(b))
 
 
 @kernel
@@ -267,7 +322,7 @@ def beam_span(factor: Float32, depth: Float32, gain: F, u0: F, du: F) -> None:
         u0: How far to the right a ray of the first pixel goes, 1 ahead.
         du: What each column adds to it.
     """
-    for x in range(depth.shape[0]):
+    for x in range(depth.shape[0] // BLOCK * BLOCK):
         z = depth[x]
         side = (u0 + F(x) * du) * z / (F(2.2) + F(0.22) * z)
         far = z / F(13.0)
@@ -275,17 +330,32 @@ def beam_span(factor: Float32, depth: Float32, gain: F, u0: F, du: F) -> None:
 
 
 @kernel
-def run_end(code: Int32, start: int, end: int) -> int:
-    """Where the run of equal codes that begins at `start` is over; at `end`, if not before."""
-    value = code[start]
-    x = start + 1
-    while x + 16 <= end:  # sixteen at once
-        differ = np.int32(0)
-        for i in range(16):
-            differ = np.int32(differ | np.int32(code[x + i] ^ value))
-        if differ != 0:
-            break
-        x += 16
-    while x < end and code[x] == value:
-        x += 1
-    return x
+def mark_ends(code: Int32, ends: UInt8) -> None:
+    """Marks the last pixel of each run of equal codes with 1, others with 0.
+
+    Args:
+        code: (N + 1,) or longer.
+        ends: (N,) written.
+    """
+    for x in range(ends.shape[0] // BLOCK * BLOCK):
+        ends[x] = np.uint8(code[x] != code[x + 1])
+
+
+@kernel
+def run_end(ends: UInt8, words: UInt64, start: int, end: int) -> int:
+    """Where the run that goes on at `start` is over; at `end`, if not before.
+
+    Args:
+        ends: Of the row, as `mark_ends` writes them.
+        words: The same memory, eight pixels a word, the first in its lowest byte.
+        start, end: Columns.
+    """
+    at = start // BLOCK
+    word = words[at] & (_ALL << np.uint64(BLOCK * (start - BLOCK * at)))
+    while word == 0:
+        at += 1
+        if BLOCK * at >= end:
+            return end
+        word = words[at]
+    lowest = word & (~word + _ONE)  # 1 in one of eight bytes: its number comes to the top
+    return min(end, BLOCK * at + int((lowest * _NUMBERS) >> _TOP) + 1)

@@ -20,7 +20,7 @@ from di_envs.sensors.scene.actor_parts import (
     Parts,
     Role,
 )
-from di_envs.sensors.scene.boxes import Boxes, Material
+from di_envs.sensors.scene.boxes import Boxes, Material, turn_box
 from di_envs.world.kinds import ActorKind
 from di_envs.world.state import State
 from di_envs.world.struck import DOWN
@@ -101,7 +101,7 @@ def _place_part(
     out.centre[at, 0] = state.x[actor] + c * along - s * across
     out.centre[at, 1] = state.y[actor] + s * along + c * across
     out.centre[at, 2] = state.z[actor] + up
-    out.yaw[at] = state.yaw[actor]
+    turn_box(out, at, state.yaw[actor])
     out.pitch[at] = 0.0
 
 

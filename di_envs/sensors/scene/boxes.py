@@ -6,6 +6,7 @@ ramps). World frame, metres.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -36,6 +37,7 @@ class Boxes(NamedTuple):
     count: NDArray[np.int64]  # type: ignore[assignment]  # (1,)
     centre: NDArray[np.float64]  # (B, 3) x, y, z of the middle
     yaw: NDArray[np.float32]  # (B,) rad
+    turn: NDArray[np.float64]  # (B, 2) cosine and sine of the yaw
     pitch: NDArray[np.float32]  # (B,) rad
     half: NDArray[np.float32]  # (B, 3) half length, width, height [m]
     colour: NDArray[np.float32]  # (B, 3) reflectance 0..1; of lamps, what they shine
@@ -63,6 +65,7 @@ def empty_boxes(room: int) -> Boxes:
         count=np.zeros(1, np.int64),
         centre=np.zeros((room, 3)),
         yaw=np.zeros(room, np.float32),
+        turn=np.zeros((room, 2)),
         pitch=np.zeros(room, np.float32),
         half=np.zeros((room, 3), np.float32),
         colour=np.zeros((room, 3), np.float32),
@@ -78,9 +81,18 @@ def boxes_of(specs: Sequence[BoxSpec]) -> Boxes:
     boxes.count[0] = len(specs)
     for row, spec in enumerate(specs):
         boxes.centre[row], boxes.half[row], boxes.colour[row] = spec.centre, spec.half, spec.colour
-        boxes.yaw[row], boxes.pitch[row] = spec.yaw, spec.pitch
+        boxes.pitch[row] = spec.pitch
+        turn_box(boxes, row, spec.yaw)
         boxes.tag[row], boxes.material[row] = spec.tag, spec.material
     return boxes
+
+
+@kernel
+def turn_box(boxes: Boxes, row: int, yaw: float) -> None:
+    """Writes how a box is turned [rad]."""
+    boxes.yaw[row] = yaw
+    kept = np.float64(boxes.yaw[row])
+    boxes.turn[row, 0], boxes.turn[row, 1] = math.cos(kept), math.sin(kept)
 
 
 @kernel
@@ -94,6 +106,7 @@ def copy_box(source: Boxes, row: int, target: Boxes) -> None:
         target.half[at, axis] = source.half[row, axis]
         target.colour[at, axis] = source.colour[row, axis]
     target.yaw[at] = source.yaw[row]
+    target.turn[at, 0], target.turn[at, 1] = source.turn[row, 0], source.turn[row, 1]
     target.pitch[at] = source.pitch[row]
     target.tag[at] = source.tag[row]
     target.material[at] = source.material[row]

@@ -16,7 +16,7 @@ from di_envs.numerics.bundles import by_reference
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.scene.actor_boxes import DETAIL_M, add_actor
 from di_envs.sensors.scene.actor_parts import PARTS, Parts
-from di_envs.sensors.scene.boxes import Boxes, Material, boxes_of, copy_box, empty_boxes
+from di_envs.sensors.scene.boxes import Boxes, Material, boxes_of, copy_box, empty_boxes, turn_box
 from di_envs.sensors.scene.props import scenery_of
 from di_envs.sensors.scene.raster import Raster
 from di_envs.sensors.scene.signal_heads import LAMP_DEPTH_M, LAMP_HALF_M, Lamps, signal_boxes
@@ -130,7 +130,7 @@ def _add_lamps(lamps: Lamps, state: State, x: float, y: float, range_m: float, o
         out.half[at, 0] = LAMP_DEPTH_M
         out.half[at, 1] = LAMP_HALF_M
         out.half[at, 2] = LAMP_HALF_M
-        out.yaw[at] = lamps.pose[lamp, 3]
+        turn_box(out, at, lamps.pose[lamp, 3])
         out.pitch[at] = 0.0
         out.tag[at] = _LIGHT_TAG
         out.material[at] = _LAMP if lit else _PLAIN
