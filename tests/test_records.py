@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 import driveinsight
+from agents.versions import agent_packages
+from di_envs.numerics.kernels import cpu_capability
 from docs.scripts.leaderboard_page import column, read_records
 
 RECORDS = read_records()
@@ -14,6 +16,8 @@ RECORDS = read_records()
 @pytest.mark.parametrize("place", RECORDS)
 def test_a_route_of_every_record_drives_as_it_did(place, tmp_path):
     record = RECORDS[place]
+    if agent_packages(record["agent"]) and record["cpu"] != cpu_capability():
+        pytest.skip(f"networks add up in another order than on the record's CPU, {record['cpu']}")
     shortest = min(range(len(record["routes"])), key=column(record, "km").__getitem__)
     route, seed, *expected = record["routes"][shortest]
     run = driveinsight.evaluate(

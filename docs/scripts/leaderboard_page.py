@@ -54,6 +54,7 @@ def record_of(run: RunRecord) -> dict[str, Any]:
         "options": dict(run.options),
         "seeds": list(run.seeds),
         "versions": dict(run.versions),
+        "cpu": run.cpu,
         "run": run_hash(run),
         "infractions": {EVENT_KEYS[kind]: count for kind, count in sorted(counts.items())},
         "columns": list(COLUMNS),
@@ -120,8 +121,9 @@ def line(place: str, record: Record) -> str:
     km = math.fsum(column(record, "km"))
     count = sum(record["infractions"].values())
     bounds = [bound for bound in column(record, "bound") if bound is not None]
+    version = re.sub(r"(files \w{8})\w+", r"\1…", record["agent_version"])  # whole in the record
     cells = (
-        f"`{record['agent']}` ({record['agent_version']})",
+        f"`{record['agent']}` ({version})",
         record["track"],
         str(interval(record, "driving_score")),
         str(interval(record, "route_completion")),
