@@ -15,7 +15,7 @@ from numba.core.caching import NullCache
 from numba.core.registry import CPUDispatcher
 from numba.core.typing import Signature
 
-from di_envs.numerics.ingredients import IngredientCompiler
+from di_envs.numerics.ingredients import IngredientCompiler, KernelCompiler
 from di_envs.numerics.together import Part, Together
 
 _OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -36,7 +36,7 @@ class KernelDispatcher(CPUDispatcher):
         targetoptions: Mapping[str, Any] | None = None,
     ) -> None:
         """Of a function; the other two arguments are Numba's own."""
-        super().__init__(py_func, locals or {}, dict(targetoptions or _OPTIONS))
+        super().__init__(py_func, locals or {}, dict(targetoptions or _OPTIONS), KernelCompiler)
         self.within = CPUDispatcher(
             py_func, {}, _OPTIONS | {"no_cpython_wrapper": True}, IngredientCompiler
         )
@@ -51,7 +51,7 @@ class KernelDispatcher(CPUDispatcher):
         """Has its parts begun, unless its code for arguments of these types is at hand."""
         if self.parts and given not in self.overloads and given not in self._begun:
             if self._cache.load_overload(given, self.targetctx) is None:
-                self._begun[given] = Together(list(self.parts(*given)))
+                self._begun[given] = Together(list(self.parts(*given)), whole=(self, given))
 
     def compile(self, sig: Any) -> Any:
         """Compiles it for Python, unless it is: first its parts, if it must be."""
@@ -61,6 +61,10 @@ class KernelDispatcher(CPUDispatcher):
         if begun:
             begun.finish()
         return super().compile(sig)
+
+    def compile_of_parts(self, given: tuple[Any, ...]) -> Any:
+        """Compiles it for Python, its parts being at hand."""
+        return super().compile(given)
 
     def get_call_template(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
         """Compiles it for a kernel that calls it, with arguments of these types."""

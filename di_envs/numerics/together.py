@@ -34,18 +34,28 @@ help_out()
 
 
 class Together:
-    """Kernels to be compiled as other kernels call them; the other process begins at once."""
+    """Kernels to be compiled as other kernels call them, and then the one that is made of them.
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    The other process begins at once.
+    """
+
+    def __init__(self, parts: Sequence[Part], whole: Part) -> None:
         """Starts the other process, if there is a core for it."""
-        self._left = deque(parts)
+        self._left, self._whole = deque([*parts, whole]), whole
+        self._taking = threading.Lock()
         self._helper = _helper() if len(parts) > 1 and _cores() > 1 else None
         self._thread = threading.Thread(target=self._hand_out, daemon=True)
         if self._helper:
             self._thread.start()
 
     def finish(self) -> None:
-        """Does what is left here, and waits for what the other does."""
+        """Does what is left here, and waits for what the other does.
+
+        The whole waits for its parts: only the other process takes it, if it has done them all.
+        """
+        with self._taking:
+            if self._left:
+                self._left.pop()
         while (part := self._next()) is not None:
             _compile(*part)
         if self._helper:
@@ -53,10 +63,8 @@ class Together:
 
     def _next(self) -> Part | None:
         """What nobody has taken; None if there is no more."""
-        try:
-            return self._left.popleft()
-        except IndexError:
-            return None
+        with self._taking:
+            return self._left.popleft() if self._left else None
 
     def _hand_out(self) -> None:
         """Gives the other process one part after the other, and tells what it compiles."""
@@ -73,7 +81,7 @@ class Together:
                 if part is None:
                     break
                 kernel, given = part
-                _send(self._helper.stdin, (_name_of(kernel), given))
+                _send(self._helper.stdin, (_name_of(kernel), given, part is self._whole))
         except (OSError, EOFError, pickle.UnpicklingError):
             pass  # what it has not done is compiled here, when it is called
         finally:
@@ -87,8 +95,11 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if can_ask else os.cpu_count() or 1
 
 
-def _compile(kernel: Any, given: tuple[Any, ...]) -> None:
-    kernel.within.compile(given)
+def _compile(kernel: Any, given: tuple[Any, ...], whole: bool = False) -> None:
+    if whole:
+        kernel.compile_of_parts(given)
+    else:
+        kernel.within.compile(given)
 
 
 def _helper() -> subprocess.Popen[bytes] | None:
@@ -134,10 +145,10 @@ def help_out() -> None:
         while True:
             _send(told, "")  # nothing to do
             try:
-                name, types = pickle.load(given)
+                name, types, whole = pickle.load(given)
             except EOFError:
                 return
-            _compile(_named(name), types)
+            _compile(_named(name), types, whole)
 
 
 class _Teller(numba_event.Listener):

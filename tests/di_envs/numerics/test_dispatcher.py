@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import operator
 import sys
 
 import numpy as np
 import pytest
 from numba.core import event as numba_event
 from numba.core import registry, types
-from numba.core.compiler import run_frontend
+from numba.core.compiler import Flags, run_frontend
 from numba.core.typed_passes import type_inference_stage
+from numba.core.typing.context import BaseContext
 
 from di_envs.files import caches
 from di_envs.numerics import together
+from di_envs.numerics.ingredients import _Asked
 from di_envs.numerics.kernels import bind, kernel, made_of, prepare
-from di_envs.numerics.keyed_random import normal, uniform
+from di_envs.numerics.keyed_random import keyed_hash, normal, uniform
 from di_envs.world import step
 from leaderboard.running.warming import drive_a_little
 
@@ -92,6 +95,59 @@ def test_another_process_compiles_the_parts_and_is_heard_of(empty):
     assert len(parts) == 2
     assert bind(function, *arguments)(*arguments) == pytest.approx(drawn(*arguments), abs=0)
     assert not function._begun
+
+
+def test_who_has_done_all_parts_compiles_the_whole(empty):
+    compiled = []
+
+    class Compiled(numba_event.Listener):
+        def on_start(self, event):
+            compiled.append(event)
+
+        def on_end(self, event):
+            pass
+
+    function = made_of(lambda *_: [(uniform, KEY), (keyed_hash, KEY)])(kernel(normal.py_func))
+    arguments = (np.uint64(3), 5, 0, 0)
+    prepare(function, lambda: arguments)
+    (begun,) = function._begun.values()
+    begun._thread.join()
+    with numba_event.install_listener("numba:compile", Compiled()):
+        assert bind(function, *arguments)(*arguments) == normal(*arguments)
+    assert not compiled, "this process had only to load it"
+
+
+def test_a_product_of_two_numbers_is_given_its_type_once(monkeypatch):
+    asked = []
+    resolve = BaseContext.resolve_function_type
+
+    def ask(context, function, args, kws):
+        asked.append((function, tuple(args)))
+        return resolve(context, function, args, kws)
+
+    @kernel
+    def square(number):
+        return number * number
+
+    @kernel
+    def cube(number):
+        return square(number) * number
+
+    monkeypatch.setattr(BaseContext, "resolve_function_type", ask)
+    assert cube(np.complex64(2j)) == np.complex64(-8j)
+    assert asked.count((operator.mul, (types.complex64, types.complex64))) <= 1
+
+
+def test_flags_are_to_numba_what_they_were():
+    flags = Flags()
+    flags.nrt, flags.error_model = True, "numpy"
+    told = _Asked(flags).copy()
+    assert told == flags
+    assert hash(told) == hash(flags)
+    assert told == _Asked(flags).copy()
+    assert told != _Asked(Flags()).copy()
+    assert told.nrt
+    assert told.summary() == flags.summary().replace("Flags", "_Told")
 
 
 def test_the_other_process_ends_when_nobody_listens_any_more():
