@@ -146,7 +146,10 @@ AGENTS: dict[str, AgentEntry] = {
         score="85.5",
     ),
     "interfuser": _system(
-        "interfuser", "interfuser:InterfuserAgent", "all views in a transformer, safety controller"
+        "interfuser",
+        "interfuser:InterfuserAgent",
+        "all views in a transformer, safety controller",
+        score="72.0",
     ),
     "lbc-teacher": _system(
         "lbc-teacher",
