@@ -14,6 +14,7 @@ from di_envs.sensors.camera.drops import add_glow, add_rain
 from di_envs.sensors.camera.face_shading import colour_face, colour_sky
 from di_envs.sensors.camera.ground_shading import colour_ground, shade_row
 from di_envs.sensors.camera.projection import Projected, place_camera, project_boxes
+from di_envs.sensors.camera.runs import mark_ends, run_end
 from di_envs.sensors.camera.shadows import project_shadows
 from di_envs.sensors.camera.spans import (
     BLOCK,
@@ -23,9 +24,7 @@ from di_envs.sensors.camera.spans import (
     fill,
     hit_box,
     hit_upright,
-    mark_ends,
     multiply,
-    run_end,
     store_row,
     whole,
 )

@@ -16,17 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.numerics.arrays import Float32, Int32, UInt8, UInt64
+from di_envs.numerics.arrays import Float32, Int32, UInt8
 from di_envs.numerics.kernels import kernel
 
 F = np.float32
 ONE, ZERO, HALF, FULL = F(1.0), F(0.0), F(0.5), F(255.0)
 NEAR_M = F(0.1)
-_ALL, _ONE, _TOP = np.uint64(2**64 - 1), np.uint64(1), np.uint64(56)
-_NUMBERS = np.uint64(0x0001020304050607)
 BLOCK = 8  # pixels; the loops say so to LLVM by ending at `N // BLOCK * BLOCK`
-
-
 RGB = tuple[F, F, F]  # of one colour, in levels, or what multiplies them
 
 
@@ -327,35 +323,3 @@ def beam_span(factor: Float32, depth: Float32, gain: F, u0: F, du: F) -> None:
         side = (u0 + F(x) * du) * z / (F(2.2) + F(0.22) * z)
         far = z / F(13.0)
         factor[x] = ONE + gain / ((ONE + far * far) * (ONE + side * side))
-
-
-@kernel
-def mark_ends(code: Int32, ends: UInt8) -> None:
-    """Marks the last pixel of each run of equal codes with 1, others with 0.
-
-    Args:
-        code: (N + 1,) or longer.
-        ends: (N,) written.
-    """
-    for x in range(ends.shape[0] // BLOCK * BLOCK):
-        ends[x] = np.uint8(code[x] != code[x + 1])
-
-
-@kernel
-def run_end(ends: UInt8, words: UInt64, start: int, end: int) -> int:
-    """Where the run that goes on at `start` is over; at `end`, if not before.
-
-    Args:
-        ends: Of the row, as `mark_ends` writes them.
-        words: The same memory, eight pixels a word, the first in its lowest byte.
-        start, end: Columns.
-    """
-    at = start // BLOCK
-    word = words[at] & (_ALL << np.uint64(BLOCK * (start - BLOCK * at)))
-    while word == 0:
-        at += 1
-        if BLOCK * at >= end:
-            return end
-        word = words[at]
-    lowest = word & (~word + _ONE)  # 1 in one of eight bytes: its number comes to the top
-    return min(end, BLOCK * at + int((lowest * _NUMBERS) >> _TOP) + 1)

@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from di_envs.sensors.camera.raster_spans import add_colours, fetch, texel_places, water_depths
+from di_envs.sensors.camera.runs import mark_ends, run_end
 from di_envs.sensors.camera.spans import (
     BLOCK,
     Axis,
     BoxRays,
     hit_box,
     hit_upright,
-    mark_ends,
-    run_end,
     whole,
 )
 
