@@ -163,6 +163,16 @@ def test_a_row_of_the_leaderboard_can_be_redone_on_paper():
     )
 
 
+@pytest.mark.parametrize(("text", "said"), [(None, "there is no"), ("{", "is not whole JSON")])
+def test_what_is_no_run_is_refused_by_the_leaderboard_in_a_line(tmp_path, capsys, text, said):
+    board = runpy.run_path(str(TOP / "docs" / "scripts" / "leaderboard_page.py"))
+    if text is not None:
+        (tmp_path / "driveinsight.json").write_text(text, encoding="utf-8")
+    with pytest.raises(SystemExit):
+        board["main"](["--add", str(tmp_path)])
+    assert said in capsys.readouterr().err
+
+
 @pytest.mark.full
 def test_the_site_is_built_without_warnings_and_asks_nobody_else(tmp_path):
     pytest.importorskip("mkdocs", reason="needs the extra docs")

@@ -19,7 +19,7 @@ from di_envs.files.whole import write_whole
 from di_envs.rules import rules_named
 from di_envs.world.event_names import EVENT_KEYS
 from leaderboard.records.record import RunRecord
-from leaderboard.records.results import read_run
+from leaderboard.records.results import ResultsError, read_run
 from leaderboard.records.run_json import run_hash
 from leaderboard.replaying.verify import verify_run
 from leaderboard.statistics.confidence import MeanInterval, mean_interval
@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for folder in parser.parse_args(arguments).add:
         try:
             print(f"added {add(folder)}")
-        except ValueError as error:
+        except (ResultsError, ValueError) as error:
             parser.error(str(error))
     write_whole(PAGE, with_tables(PAGE.read_text(encoding="utf-8"), tables(read_records())))
 
