@@ -97,7 +97,8 @@ class ResNet(nn.Module):
 
     def stem(self, images: Tensor) -> Tensor:
         """(B, 3, H, W) to (B, width, H/4, W/4)."""
-        return F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
+        # the same as the other way round, and less to do
+        return F.relu(F.max_pool2d(self.bn1(self.conv1(images)), 3, 2, 1))
 
     def layer(self, number: int, x: Tensor) -> Tensor:
         """One of its layers, 0 the first: for who puts something between them."""

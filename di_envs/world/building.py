@@ -97,7 +97,7 @@ def make_scratch(town: Town, capacity: Capacity) -> Scratch:
         occupancy=make_occupancy(town.lanes.kind.size, actors, capacity.egos),
         requests=make_requests(actors),
         leaders=make_leaders(actors),
-        neighbours=make_neighbours(actors),
+        neighbours=make_neighbours(actors, town.lanes.kind.size),
         busy=np.zeros(town.crosswalks.width_m.size, np.int8),
         acceleration=np.zeros(actors),
         cap=np.zeros(actors),

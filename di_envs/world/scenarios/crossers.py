@@ -27,7 +27,8 @@ from di_envs.world.scenarios.tables import (
 from di_envs.world.state import OCCUPIED_LANES, TICK_S, ActorKind, State
 from di_envs.world.struck import DOWN, lie
 from di_envs.world.traffic.occupancy import Occupancy, insert_body
-from di_envs.world.walkers.crossing import BODY_M, is_in_the_way, is_vehicle
+from di_envs.world.walkers.crossing import BODY_M, is_in_the_way
+from di_envs.world.walkers.neighbours import is_vehicle
 from di_envs.world.walkers.spawn import HEIGHT_M
 
 WAITING, CROSSING = 1, 2

@@ -10,7 +10,15 @@ from di_envs.numerics.kernels import kernel
 from di_envs.town.lanes import LightState, Signals
 from di_envs.world.bodies import SAME_LEVEL_M
 from di_envs.world.lights import TURN_TICKS
-from di_envs.world.state import TICK_S, ActorKind, State
+from di_envs.world.state import TICK_S, State
+from di_envs.world.walkers.neighbours import (
+    LOOK_S,
+    Neighbours,
+    cell_of,
+    is_vehicle,
+    stretches_around,
+    way_ahead_m,
+)
 from di_envs.world.walkers.walk_graph import WalkGraph
 
 COMFORTABLE_MPS2 = 2.5  # braking that walkers expect of drivers …
@@ -19,16 +27,8 @@ ROOM_M = 3.0  # … to a stop this far before the strip
 STANDS_MPS = 0.3  # a vehicle slower than this is taken to stand
 SPARE_TICKS = round(1.0 / TICK_S)  # of red left when a walker has crossed
 BODY_M = 0.25  # half a walker's width
-LOOK_S = 1.0  # of a vehicle's way ahead that walkers do not step into
 
 RED = int(LightState.RED)
-FIRST_VEHICLE, LAST_VEHICLE = int(ActorKind.CAR), int(ActorKind.BICYCLE)
-
-
-@kernel
-def is_vehicle(kind: int) -> bool:
-    """Whether an actor of this kind is one that people look out for."""
-    return FIRST_VEHICLE <= kind <= LAST_VEHICLE
 
 
 @kernel
@@ -63,7 +63,7 @@ def _lights_hold(
 
 
 @kernel
-def _is_on_strip(state: State, strip: Float64, actor: int) -> bool:
+def is_on_strip(state: State, strip: Float64, actor: int) -> bool:
     """Whether an actor's box reaches onto a strip (6,): x, y, z, yaw, half length and width."""
     if abs(state.z[actor] - strip[2]) >= SAME_LEVEL_M:
         return False
@@ -100,13 +100,11 @@ def _goes_over(state: State, actor: int, lane: int) -> bool:
 
 
 @kernel
-def _leaves_room(state: State, walk: WalkGraph, crosswalk: int, actor: int) -> bool:
-    """Whether a vehicle is off the strip, and not heading for it or able to stop comfortably."""
-    if _is_on_strip(state, walk.strip[crosswalk], actor):
-        return False
+def is_coming(state: State, walk: WalkGraph, crosswalk: int, actor: int) -> bool:
+    """Whether a vehicle is heading for a strip, and not able to stop comfortably before it."""
     lane = state.lane[actor]
     if lane < 0:
-        return True
+        return False
     front = state.lane_m[actor] + state.half_length[actor]
     rear = state.lane_m[actor] - state.half_length[actor]
     for k in range(walk.approach_start[lane], walk.approach_start[lane + 1]):
@@ -115,8 +113,42 @@ def _leaves_room(state: State, walk: WalkGraph, crosswalk: int, actor: int) -> b
         if could_stop(state.speed[actor], walk.approach_begin_m[k] - front):
             continue
         if _goes_over(state, actor, walk.approach_lane[k]):
-            return False
-    return True
+            return True
+    return False
+
+
+@kernel
+def _is_occupied(state: State, walk: WalkGraph, near: Neighbours, crosswalk: int) -> bool:
+    """Whether an ego or another vehicle reaches onto a strip."""
+    strip = walk.strip[crosswalk]
+    for ego in range(state.throttle.size):
+        if is_vehicle(state.kind[ego]) and is_on_strip(state, strip, ego):
+            return True
+    within = strip[4] + strip[5] + near.longest_m[1]
+    left, right, top, bottom = stretches_around(strip[0], strip[1], within)
+    for row in range(top, bottom):
+        for column in range(left, right):
+            vehicle = near.first_vehicle[cell_of(column, row)]
+            while vehicle >= 0:
+                if is_on_strip(state, strip, vehicle):
+                    return True
+                vehicle = near.next_vehicle[vehicle]
+    return False
+
+
+@kernel
+def _is_driven_at(state: State, walk: WalkGraph, near: Neighbours, crosswalk: int) -> bool:
+    """Whether an ego or another vehicle is coming to a strip."""
+    for ego in range(state.throttle.size):
+        if is_vehicle(state.kind[ego]) and is_coming(state, walk, crosswalk, ego):
+            return True
+    for k in range(walk.leading_start[crosswalk], walk.leading_start[crosswalk + 1]):
+        vehicle = near.first_on_lane[walk.leading[k]]
+        while vehicle >= 0:
+            if is_coming(state, walk, crosswalk, vehicle):
+                return True
+            vehicle = near.next_on_lane[vehicle]
+    return False
 
 
 @kernel
@@ -124,20 +156,16 @@ def may_cross(
     state: State,
     walk: WalkGraph,
     signals: Signals,
+    near: Neighbours,
     crosswalk: int,
     needed_ticks: int,
-    vehicle_end: int,
 ) -> bool:
-    """Whether a walker who needs so many ticks may step onto a crosswalk now.
-
-    Egos and vehicles, which are looked out for, are the actors before `vehicle_end`.
-    """
+    """Whether a walker who needs so many ticks may step onto a crosswalk now."""
     if not _lights_hold(state, walk, signals, crosswalk, needed_ticks):
         return False
-    for actor in range(vehicle_end):
-        if is_vehicle(state.kind[actor]) and not _leaves_room(state, walk, crosswalk, actor):
-            return False
-    return True
+    if _is_driven_at(state, walk, near, crosswalk):
+        return False
+    return not _is_occupied(state, walk, near, crosswalk)
 
 
 @kernel
@@ -158,7 +186,7 @@ def is_in_the_way(
     """
     dx, dy = state.x[actor] - x, state.y[actor] - y
     half_length, look = state.half_length[actor], look_s * state.speed[actor]
-    reach = half_length + look + 2.0
+    reach = way_ahead_m(state, actor, look_s)
     if abs(dx) > reach or abs(dy) > reach or abs(state.z[actor] - z) >= SAME_LEVEL_M:
         return False
     step_x, step_y = step_m * math.cos(heading), step_m * math.sin(heading)
@@ -175,7 +203,8 @@ def is_in_the_way(
 @kernel
 def is_blocked(
     state: State,
-    actors: int,
+    near: Neighbours,
+    on_road: bool,
     x: float,
     y: float,
     z: float,
@@ -183,10 +212,23 @@ def is_blocked(
     step_m: float,
     margin_m: float,
 ) -> bool:
-    """Whether one of the first `actors` stands in, or drives into, a walker's next step."""
-    for actor in range(actors):
-        if is_vehicle(state.kind[actor]) and is_in_the_way(
-            state, actor, x, y, z, heading, step_m, margin_m, LOOK_S
+    """Whether somebody stands in, or drives into, a walker's next step.
+
+    Egos may be anywhere, other vehicles only where he is on the road.
+    """
+    for ego in range(state.throttle.size):
+        if is_vehicle(state.kind[ego]) and is_in_the_way(
+            state, ego, x, y, z, heading, step_m, margin_m, LOOK_S
         ):
             return True
+    if not on_road:
+        return False
+    left, right, top, bottom = stretches_around(x, y, near.longest_m[0])
+    for row in range(top, bottom):
+        for column in range(left, right):
+            vehicle = near.first_vehicle[cell_of(column, row)]
+            while vehicle >= 0:
+                if is_in_the_way(state, vehicle, x, y, z, heading, step_m, margin_m, LOOK_S):
+                    return True
+                vehicle = near.next_vehicle[vehicle]
     return False

@@ -70,18 +70,18 @@ def step_aside(
     walker: int,
     reach_m: float,
     guide: Place,
-    bodies: int,
+    on_road: bool,
 ) -> bool:
     """Moves a walker by `reach_m` beside the straight way to `guide`, where there is room.
 
     Args:
         state: The world; the walker's place and `walk_side` change.
         walk: The walking graph.
-        near: Walkers by cell.
+        near: Who is where.
         walker: Who steps aside.
         reach_m: Length of the step.
         guide: Where he is bound: x, y, z, yaw.
-        bodies: The first actors, whose vehicles he does not step into.
+        on_road: Whether vehicles besides egos may be in the way.
 
     Returns:
         Whether he could.
@@ -97,7 +97,7 @@ def step_aside(
                 continue
             if not _is_on_way(state, walk, walker, x, y, guide):
                 continue
-            if is_blocked(state, bodies, here_x, here_y, z, heading, reach_m, 0.0):
+            if is_blocked(state, near, on_road, here_x, here_y, z, heading, reach_m, 0.0):
                 continue
             state.x[walker], state.y[walker] = x, y
             state.walk_side[walker] = side

@@ -74,7 +74,7 @@ def _behind_others(state: State, near: Neighbours, walker: int, pace: float) -> 
 
 @kernel
 def _must_wait(
-    state: State, walk: WalkGraph, signals: Signals, walker: int, first: int, pace: float
+    state: State, walk: WalkGraph, signals: Signals, near: Neighbours, walker: int, pace: float
 ) -> bool:
     """Whether the walker has come to the kerb and may not cross yet."""
     edge, direction = state.walk_edge[walker], state.walk_direction[walker]
@@ -85,7 +85,7 @@ def _must_wait(
     if (state.tick[()] + walker) % LOOK_TICKS != 0:  # they do not look all the time
         return True
     needed_ticks = int((end - kerb) / pace / TICK_S) + 1
-    return not may_cross(state, walk, signals, walk.crosswalk[edge], needed_ticks, first)
+    return not may_cross(state, walk, signals, near, walk.crosswalk[edge], needed_ticks)
 
 
 @kernel
@@ -148,7 +148,7 @@ def _follow_guide(
     walker: int,
     pace: float,
     guide: Place,
-    bodies: int,
+    on_road: bool,
 ) -> bool:
     """Moves the body towards its guide: corners are cut, not leapt, and others gone round.
 
@@ -164,7 +164,7 @@ def _follow_guide(
     if step_is_free(state, near, walker, x, y):
         state.x[walker], state.y[walker] = x, y
         state.walk_side[walker] = 0
-    elif not step_aside(state, walk, near, walker, pace * TICK_S, guide, bodies):
+    elif not step_aside(state, walk, near, walker, pace * TICK_S, guide, on_road):
         return False
     dx, dy = state.x[walker] - before_x, state.y[walker] - before_y
     speed = math.sqrt(dx * dx + dy * dy) / TICK_S
@@ -187,12 +187,13 @@ def _stand(state: State, walker: int, waiting: int) -> None:
 
 
 @kernel
-def _is_held(state: State, walker: int, pace: float, bodies: int) -> bool:
-    """Whether a vehicle among the first `bodies` actors is in the way of the next step."""
+def _is_held(state: State, near: Neighbours, walker: int, pace: float, on_road: bool) -> bool:
+    """Whether a vehicle is in the way of the next step."""
     margin = MARGIN_M if state.still_ticks[walker] < SQUEEZE_TICKS else 0.0
     return is_blocked(
         state,
-        bodies,
+        near,
+        on_road,
         state.x[walker],
         state.y[walker],
         state.z[walker],
@@ -204,25 +205,23 @@ def _is_held(state: State, walker: int, pace: float, bodies: int) -> bool:
 
 @kernel
 def _walk_on(
-    state: State, walk: WalkGraph, signals: Signals, near: Neighbours, walker: int, first: int
+    state: State, walk: WalkGraph, signals: Signals, near: Neighbours, walker: int
 ) -> None:
     """One tick of a walker on his feet; arguments as of `move_walkers`."""
     crossing = walk.crosswalk[state.walk_edge[walker]] >= 0
     pace = state.desired_factor[walker]
     if crossing:
         pace = max(pace, CROSSING_MPS)
-        if _must_wait(state, walk, signals, walker, first, pace):
+        if _must_wait(state, walk, signals, near, walker, pace):
             _stand(state, walker, 1)
             return
     pace, queues = _behind_others(state, near, walker, pace)
-    # on sidewalks only egos can be in the way
-    bodies = first if crossing else state.throttle.size
-    if pace <= 0.0 or _is_held(state, walker, pace, bodies):
+    if pace <= 0.0 or _is_held(state, near, walker, pace, crossing):
         _stand(state, walker, 1 if queues else 0)
         return
     still = state.still_ticks[walker]
     led, guide = _lead_on(state, walk, walker, pace)
-    if _follow_guide(state, walk, near, walker, pace, guide, bodies):
+    if _follow_guide(state, walk, near, walker, pace, guide, crossing):
         state.walk_waiting[walker] = 0
     else:
         _stand(state, walker, 0)
@@ -257,4 +256,4 @@ def move_walkers(
             if lie(state, walker):
                 take_away(state, walker)
         else:
-            _walk_on(state, walk, signals, near, walker, first)
+            _walk_on(state, walk, signals, near, walker)

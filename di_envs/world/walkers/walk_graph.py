@@ -71,6 +71,9 @@ class WalkGraph(NamedTuple):
     approach_lane: NDArray[np.int32]  # (V,) the crossed lane
     approach_begin_m: NDArray[np.float64]  # (V,) from this lane's start to the strip
     approach_end_m: NDArray[np.float64]  # (V,) and to its far side
+    # by crosswalk: the lanes that lead to it, those that it crosses among them
+    leading_start: NDArray[np.int32]  # (X + 1,)
+    leading: NDArray[np.int32]  # (W,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -372,10 +375,16 @@ def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> dict[str, Any]:
                         begin[before] = begin[lane] + float(lanes.length_m[before])
                         front.append(before)
     flat = [row for own in rows for row in own]
+    leading: list[list[int]] = [[] for _ in range(crosswalks.width_m.size)]
+    for lane, own in enumerate(rows):
+        for crosswalk in sorted({row[0] for row in own}):
+            leading[crosswalk].append(lane)
     return {
         "approach_start": np.cumsum([0, *(len(own) for own in rows)]).astype(np.int32),
         "approach": np.array([row[0] for row in flat], np.int32),
         "approach_lane": np.array([row[1] for row in flat], np.int32),
         "approach_begin_m": np.array([row[2] for row in flat], np.float64),
         "approach_end_m": np.array([row[3] for row in flat], np.float64),
+        "leading_start": np.cumsum([0, *(len(lanes) for lanes in leading)]).astype(np.int32),
+        "leading": np.array([lane for lanes in leading for lane in lanes], np.int32),
     }
