@@ -58,21 +58,28 @@ def editing(model: nn.Module, edits: Mapping[str, Edit]) -> Iterator[None]:
     Raises:
         ValueError: If a name is unknown; suggests the nearest.
     """
-    if not edits:  # a tenth of a decision would go into looking for names
-        yield
-        return
-    modules = dict(model.named_modules())
-    known = tap_names(model)
-    for name in edits:
-        check_name(name, known, "tap")
-    hooks = []
-    for name, edit in edits.items():
-        hooks.append(modules[name].register_forward_hook(_hook(edit)))
+    taps = [_tap(model, name) for name in edits]
+    hooks = [
+        tap.register_forward_hook(_hook(edit))
+        for tap, edit in zip(taps, edits.values(), strict=True)
+    ]
     try:
         yield
     finally:
         for hook in hooks:
             hook.remove()
+
+
+def _tap(model: nn.Module, name: str) -> Tap:
+    """A tap by its name; to look for it among all modules would take a tenth of a decision."""
+    try:
+        module = model.get_submodule(name)
+    except AttributeError:
+        module = model
+    if not isinstance(module, Tap):
+        check_name(name, tap_names(model), "tap")
+    assert isinstance(module, Tap)
+    return module
 
 
 def _hook(edit: Edit) -> Callable[[nn.Module, Any, Tensor], Tensor]:
