@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -138,8 +139,8 @@ def measure_rates(bench: Bench) -> Times:
     return world
 
 
-def measure_highway(bench: Bench, world_tick: Times | None) -> None:
-    """highway-env's act and step with as many vehicles, on the same lanes, from the same scene."""
+def highway_road(bench: Bench) -> Any:
+    """highway-env's `Road` with as many vehicles, on the same lanes, from the same scene."""
     with bench.doing("importing highway-env and making its road"):
         from highway_env.road.road import Road
 
@@ -152,6 +153,12 @@ def measure_highway(bench: Bench, world_tick: Times | None) -> None:
         for vehicle in scene.vehicles:
             vehicle.road = road
         road.vehicles = scene.vehicles
+    return road
+
+
+def measure_highway(bench: Bench, world_tick: Times | None) -> None:
+    """highway-env's act and step."""
+    road = highway_road(bench)
     seconds: list[float] = []
     with bench.doing("highway-env's Road.act() and Road.step()"):
         until = time.perf_counter() + bench.seconds
