@@ -60,7 +60,7 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.6, 0.9])
+@pytest.mark.parametrize("share", [0.6, pytest.param(0.9, marks=pytest.mark.full)])
 def test_killed_with_all_its_workers_and_resumed_a_run_is_identical(share, whole, tmp_path):
     """`benchmarks/kill_and_resume.py` does this at as many random moments as one likes."""
     assert whole.is_dir()  # so all is compiled, and the next run is as long as any
