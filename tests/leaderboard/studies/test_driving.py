@@ -129,6 +129,7 @@ def test_stopped_by_ctrl_c_it_goes_on_to_the_same_record(whole, tmp_path):
     assert timeless(again) == timeless(whole[1])
 
 
+@pytest.mark.full
 def test_more_seeds_add_to_what_is_there_and_change_nothing_of_it(whole, copy, tmp_path):
     engine = HereEngine()
     more, _ = driven(copy, seeds=2, engine=engine)
