@@ -93,7 +93,6 @@ def test_two_processes_learn_as_one_and_go_on_to_the_same_bits(tmp_path, drives)
         assert float(text) == pytest.approx(float(theirs[name]), rel=1e-4), name
 
 
-@pytest.mark.slow
 @pytest.mark.full
 def test_torchrun_trains_and_one_process_writes(tmp_path, drives):
     torchrun = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2"]
