@@ -15,15 +15,12 @@ from torch import Tensor, nn
 
 from agents.driveinsight.config import CameraEncoderConfig
 from agents.networks.grid import GridConfig
+from agents.networks.images import Standardised
 from agents.networks.lift import FrustumPooling, growing_depths_m
 from agents.networks.pyramid import FeaturePyramid
 from agents.networks.resnet import ResNet
 from agents.networks.taps import Tap
 from di_envs.sensors.camera.config import CameraConfig, Rig, rig_of
-
-# Of ImageNet's pixels, as published weights expect them
-_MEAN = (123.675, 116.28, 103.53)
-_DEVIATION = (58.395, 57.12, 57.375)
 
 
 def image_groups(rig: Rig) -> tuple[tuple[CameraConfig, ...], ...]:
@@ -79,14 +76,9 @@ class ImageEncoder(nn.Module):
 class CameraEncoder(nn.Module):
     """Images of all cameras to one BEV feature map."""
 
-    scale: Tensor
-    shift: Tensor
-
     def __init__(self, config: CameraEncoderConfig, grid: GridConfig) -> None:
         super().__init__()
-        scale = 1.0 / torch.tensor(_DEVIATION)[:, None, None]
-        self.register_buffer("scale", scale, persistent=False)
-        self.register_buffer("shift", -torch.tensor(_MEAN)[:, None, None] * scale, persistent=False)
+        self.standard = Standardised()
         groups = image_groups(rig_of(config.rig))
         self.views = nn.ModuleList(ImageEncoder(group, config, grid) for group in groups)
         # in which a lamp is largest
@@ -107,10 +99,7 @@ class CameraEncoder(nn.Module):
             lifted by; and features of the camera that sees lamps best, fine and deep, see
             `ImageEncoder`.
         """
-        views = [
-            view(torch.addcmul(self.shift, group.float(), self.scale))
-            for view, group in zip(self.views, images, strict=True)
-        ]
+        views = [view(self.standard(group)) for view, group in zip(self.views, images, strict=True)]
         # not stacked: each map keeps its channels last, as convolutions want them
         lifted = functools.reduce(torch.add, (view[0] for view in views))
         return self.bev(lifted), tuple(view[1] for view in views), views[self._sharpest][2]

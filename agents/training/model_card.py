@@ -10,6 +10,7 @@ from torch import nn
 
 from agents.driveinsight.config import PolicyConfig
 from agents.training.config import TrainConfig
+from agents.zoo.registry import system_of
 from agents.zoo.system import MOMENT_DT_S, SystemConfig
 
 _LIMITS = """\
@@ -32,10 +33,12 @@ def about_policy(network: nn.Module, config: PolicyConfig) -> tuple[str, ...]:
 
 def about_system(network: nn.Module, config: SystemConfig) -> tuple[str, ...]:
     """What a system of the zoo is: the title, and a paragraph each."""
+    eyes = system_of(config.system).eyes
+    begun = f" Its cameras' encoders began as those of `{eyes}`, and learnt on." if eyes else ""
     return (
         f"# System `{config.name}`",
         f"{_size(network):,} parameters; sees {config.inputs}; {config.waypoints} waypoints "
-        f"{MOMENT_DT_S} s apart.",
+        f"{MOMENT_DT_S} s apart.{begun}",
         _json(config.to_mapping()),
     )
 

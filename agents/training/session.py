@@ -121,10 +121,11 @@ def begin(plan: TrainingPlan, team: Team, device: str) -> Session:
 
     Raises:
         TrainingError: If there is nothing to learn from, or the folder holds another training.
-        WeightsError: If there is no policy to begin with.
+        WeightsError: If there is no policy to begin with, whether asked for or a system's own.
         DriveFileError: If a drive is not whole.
     """
-    origins = [weights_digest(folder) for folder in (plan.init_from, plan.eyes) if folder]
+    begun_from = (trainee_of(plan.policy).pretrained, plan.init_from, plan.eyes)
+    origins = [weights_digest(folder) for folder in begun_from if folder]
     moments = load_moments(plan.data, plan.training.standing_share)
     config = _filled_in(plan, moments, team, device, " ".join(origins))
     training = Training.begin(plan.policy, config, device, team)

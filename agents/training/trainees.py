@@ -16,11 +16,11 @@ import torch
 from torch import Tensor, nn
 
 from agents.base import Requirements
-from agents.driveinsight.agent import requirements_of
+from agents.driveinsight.agent import SHIPPED, requirements_of
 from agents.driveinsight.config import BEV, CONFIGS, TOKENS, PolicyConfig
 from agents.driveinsight.losses import Targets, counts, losses
 from agents.driveinsight.model import Policy
-from agents.driveinsight.weights import save_pretrained
+from agents.driveinsight.weights import from_pretrained, save_pretrained
 from agents.networks.weights import take_tensors
 from agents.training.config import TrainConfig
 from agents.training.frames import DriveStage, RecordedDrive
@@ -36,8 +36,9 @@ from agents.training.samples import (
     without,
 )
 from agents.training.standing import FOR
+from agents.zoo.eyes import BevEyes
 from agents.zoo.inputs import inputs_of
-from agents.zoo.registry import config_from, config_of, network_of, system_names
+from agents.zoo.registry import config_from, config_of, network_of, system_names, system_of
 from agents.zoo.system import Output, SystemConfig, SystemModel
 from agents.zoo.weights import holds_system, load_network, save_system
 from di_envs.config import check_name
@@ -75,9 +76,14 @@ class Trainee(ABC):
         """Whether most of its time goes into convolutions, as with pictures."""
         return "camera" in self.requires.observations
 
+    @property
+    def pretrained(self) -> Path | None:
+        """A policy whose cameras it sees by before it has learnt anything; None for fresh ones."""
+        return None
+
     @abstractmethod
     def network(self) -> nn.Module:
-        """Fresh weights, drawn from torch's generator."""
+        """What training begins with: weights drawn from torch's generator, but for `pretrained`."""
 
     @abstractmethod
     def renderer(self, town: Town, plan_of: Callable[[str], RoutePlan]) -> Renderer:
@@ -216,8 +222,19 @@ class SystemTrainee(Trainee):
     def requires(self) -> Requirements:
         return self.config.requires
 
+    @property
+    def pretrained(self) -> Path | None:
+        name = system_of(self.config.system).eyes
+        return SHIPPED / name if name else None
+
     def network(self) -> SystemModel:
-        return network_of(self.config)
+        network = network_of(self.config)
+        if self.pretrained is not None:
+            policy = from_pretrained(self.pretrained)
+            for part in network.modules():
+                if isinstance(part, BevEyes):
+                    part.learnt_by(policy)
+        return network
 
     def renderer(self, town: Town, plan_of: Callable[[str], RoutePlan]) -> Renderer:
         return SystemRenderer(self.config, town, plan_of)

@@ -1,6 +1,7 @@
 """Cameras, and a LiDAR where a system has one, to one map of the ground, and what is remembered.
 
-By the encoders of the paper's policy, at a size that leaves room for what makes a system itself.
+By the encoders of the paper's policy. Training begins with what that policy's cameras have learnt:
+what makes a system itself comes after them, and 60,000 samples do not teach both.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from agents.driveinsight.config import CameraEncoderConfig, LidarEncoderConfig
 from agents.driveinsight.fusion import MultiModalFusion
 from agents.driveinsight.lidar import LidarEncoder
 from agents.driveinsight.memory import warp
+from agents.driveinsight.model import Policy
 from agents.explain.protocol import FeatureMap
 from agents.networks.blocks import conv_block
 from agents.networks.grid import GridConfig
-from agents.networks.images import normalised
+from agents.networks.images import Standardised
 from agents.networks.taps import Tap
 from agents.zoo.raster import GRID
 from agents.zoo.system import Seen, State, SystemConfig
@@ -26,6 +28,8 @@ BEV = GridConfig(
     x_min_m=GRID.x_min_m, x_max_m=GRID.x_max_m, y_min_m=GRID.y_min_m, y_max_m=GRID.y_max_m, cells=48
 )
 EXTENT_M = (BEV.x_min_m, BEV.x_max_m, BEV.y_min_m, BEV.y_max_m)
+_IMAGES = CameraEncoderConfig()
+CHANNELS = _IMAGES.channels  # of a map of the ground
 
 
 class BevEyes(nn.Module):
@@ -33,36 +37,40 @@ class BevEyes(nn.Module):
 
     Args:
         config: Of the system.
-        channels: Of the map.
-        width: Of the first of three layers over images.
     """
 
-    def __init__(self, config: SystemConfig, channels: int, width: int) -> None:
+    def __init__(self, config: SystemConfig) -> None:
         super().__init__()
-        images = CameraEncoderConfig(width=width, channels=channels, depth_bins=24)
+        self.standard = Standardised()
         self.groups = image_groups(config.rig)
-        self.views = nn.ModuleList(ImageEncoder(group, images, BEV) for group in self.groups)
-        points = LidarEncoderConfig(channels=channels)
+        self.views = nn.ModuleList(ImageEncoder(group, _IMAGES, BEV) for group in self.groups)
+        points = LidarEncoderConfig(channels=CHANNELS)
         self.lidar = LidarEncoder(points, BEV) if config.lidar else None
-        self.fusion = MultiModalFusion([channels] * (1 + bool(config.lidar)), channels)
+        self.fusion = MultiModalFusion([CHANNELS] * (1 + bool(config.lidar)), CHANNELS)
         self.bev = Tap()
 
     def forward(self, seen: Seen) -> tuple[Tensor, Tensor]:
         """Sees.
 
         Returns:
-            (B, channels, X, Y) on `BEV`; and (B, channels) what the first camera shows, as a whole.
+            (B, CHANNELS, X, Y) on `BEV`; and (B, CHANNELS) what the first camera shows, as a whole.
         """
         lifted, ahead = list[Tensor](), list[Tensor]()
         for group, view in zip(self.groups, self.views, strict=True):
-            images = torch.stack([normalised(seen[camera.name]) for camera in group], dim=1)
-            bev, _, (_, first) = view(images)
+            images = torch.stack([seen[camera.name] for camera in group], dim=1)
+            bev, _, (_, first) = view(self.standard(images))
             lifted.append(bev)
             ahead.append(first.mean(dim=(2, 3)))
         maps = [torch.stack(lifted).sum(dim=0)]
         if self.lidar is not None:
             maps.append(self.lidar(seen["lidar"]))
         return self.bev(self.fusion(maps)), ahead[0]
+
+    def learnt_by(self, policy: Policy) -> None:
+        """Takes over what another policy's cameras have learnt; its rig is of the same sizes."""
+        assert policy.perception is not None, "it has no eyes"
+        assert policy.perception.camera is not None, "it has no cameras"
+        self.views.load_state_dict(policy.perception.camera.views.state_dict())
 
     def maps(self, path: str) -> dict[str, FeatureMap]:
         """Its maps, for an anatomy; the module's dotted path is `path`."""
@@ -78,13 +86,12 @@ class Recall(nn.Module):
     """The map of the moment before, brought to where the ego is now, beside the present one.
 
     Args:
-        channels: Of the map.
         recurrent: Whether what was joined is remembered, and not what was seen alone.
     """
 
-    def __init__(self, channels: int, *, recurrent: bool) -> None:
+    def __init__(self, *, recurrent: bool) -> None:
         super().__init__()
-        self.join = conv_block(2 * channels, channels)
+        self.join = conv_block(2 * CHANNELS, CHANNELS)
         self.recurrent = recurrent
 
     def forward(self, bev: Tensor, pose: Tensor, state: State | None) -> tuple[Tensor, State]:

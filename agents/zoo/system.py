@@ -201,9 +201,12 @@ class System:
     Attributes:
         configs: Its configurations by their names in the table of agents.
         model: Of its network, which is made from a configuration.
+        eyes: Shipped policy whose cameras its own, `eyes.BevEyes`, are when training begins; empty
+            for fresh ones.
     """
 
     configs: Mapping[str, SystemConfig]
     model: Callable[[Any], SystemModel]
+    eyes: str = ""
 
     FORMAT_VERSION: ClassVar[int] = 1  # of configurations and weights on disk

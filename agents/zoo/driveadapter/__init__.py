@@ -4,4 +4,4 @@ from agents.zoo.driveadapter.config import CONFIGS
 from agents.zoo.driveadapter.model import DriveAdapter
 from agents.zoo.system import System
 
-SYSTEM = System(configs=CONFIGS, model=DriveAdapter)
+SYSTEM = System(configs=CONFIGS, model=DriveAdapter, eyes="driveinsight")

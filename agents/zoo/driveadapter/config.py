@@ -13,8 +13,6 @@ class DriveAdapterConfig(SystemConfig):
     """What it sees, and the sizes of its network.
 
     Attributes:
-        image_width: Channels of the first layer over images.
-        channels: Of the map of the ground.
         masks: Of the U-Net that says masks, the finest first.
         raw: Of the ground at each size at which adapters read it.
         width: Of what waypoints are planned from.
@@ -29,11 +27,9 @@ class DriveAdapterConfig(SystemConfig):
     odometry: bool = True
     past: int = 1
     labels: tuple[str, ...] = ("action", "raster")
-    image_width: int = 12
-    channels: int = 32
-    masks: tuple[int, ...] = (24, 32, 48)
-    raw: int = 28
-    width: int = 96
+    masks: tuple[int, ...] = (20, 28, 40)
+    raw: int = 20
+    width: int = 64
     teacher: tuple[int, ...] = (16, 32, 48, 64, 96)
     teacher_width: int = 192
 
@@ -41,7 +37,7 @@ class DriveAdapterConfig(SystemConfig):
         super().__post_init__()
         for name in ("masks", "teacher"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_sizes(self, "image_width", "channels", "masks", "raw", "width")
+        check_sizes(self, "masks", "raw", "width")
         check_sizes(self, "teacher", "teacher_width")
 
 

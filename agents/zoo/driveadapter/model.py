@@ -23,7 +23,7 @@ from agents.networks.waypoint_heads import StepsHead
 from agents.zoo.driveadapter.config import DriveAdapterConfig
 from agents.zoo.driveadapter.masks import MaskHead, drawn_route, mask_losses
 from agents.zoo.errors import waypoint_error
-from agents.zoo.eyes import EXTENT_M, BevEyes, Recall
+from agents.zoo.eyes import CHANNELS, EXTENT_M, BevEyes, Recall
 from agents.zoo.raster import GRID, RasterChannel
 from agents.zoo.system import Labels, Output, Seen, State, TaughtModel
 
@@ -65,11 +65,11 @@ class DriveAdapter(TaughtModel):
         self.teacher = RasterTeacher(
             len(RasterChannel), GRID.cells, widths, width, config.waypoints
         ).requires_grad_(False)
-        self.eyes = BevEyes(config, config.channels, config.image_width)
-        self.recall = Recall(config.channels, recurrent=False)
-        self.masks = MaskHead(config.channels, config.masks)
+        self.eyes = BevEyes(config)
+        self.recall = Recall(recurrent=False)
+        self.masks = MaskHead(CHANNELS, config.masks)
         self.raw = nn.ModuleList(
-            conv_block(raw if n else config.channels, raw, stride=2 if n else 1)
+            conv_block(raw if n else CHANNELS, raw, stride=2 if n else 1)
             for n in range(len(widths))
         )
         self.adapters = nn.ModuleList(Adapter(channels, raw) for channels in widths)

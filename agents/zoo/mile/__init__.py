@@ -4,4 +4,4 @@ from agents.zoo.mile.config import CONFIGS
 from agents.zoo.mile.model import Mile
 from agents.zoo.system import System
 
-SYSTEM = System(configs=CONFIGS, model=Mile)
+SYSTEM = System(configs=CONFIGS, model=Mile, eyes="driveinsight")

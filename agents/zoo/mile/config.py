@@ -13,8 +13,6 @@ class MileConfig(SystemConfig):
     """What it sees, and the sizes of its network.
 
     Attributes:
-        image_width: Channels of the first layer over images.
-        channels: Of the map of the ground.
         token: Width of what encodes the route, and the speed.
         seen: Width of what a moment shows.
         memory: Of the part of the state that is certain.
@@ -30,8 +28,6 @@ class MileConfig(SystemConfig):
     told: tuple[str, ...] = ("routing", "speed")
     past: int = 5
     labels: tuple[str, ...] = ("action", "semantics")
-    image_width: int = 16
-    channels: int = 32
     token: int = 16
     seen: int = 128
     memory: int = 192
@@ -43,7 +39,7 @@ class MileConfig(SystemConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_sizes(self, "image_width", "channels", "token", "seen", "memory", "latent", "width")
+        check_sizes(self, "token", "seen", "memory", "latent", "width")
         for name in ("blind", "route_spoilt"):
             if not 0.0 <= getattr(self, name) <= 0.3:
                 raise ValueError(f"{name} must be from 0 to 0.3, not {getattr(self, name)}")

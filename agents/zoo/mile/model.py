@@ -26,7 +26,7 @@ from agents.networks.mlp import mlp
 from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import StepsHead
 from agents.zoo.errors import action_error, waypoint_error
-from agents.zoo.eyes import BEV, BevEyes
+from agents.zoo.eyes import BEV, CHANNELS, BevEyes
 from agents.zoo.mile.config import MileConfig
 from agents.zoo.system import Labels, Output, Seen, State, SystemModel
 from agents.zoo.told import ToldEncoder
@@ -42,10 +42,10 @@ class Observing(nn.Module):
 
     def __init__(self, config: MileConfig) -> None:
         super().__init__()
-        self.eyes = BevEyes(config, config.channels, config.image_width)
+        self.eyes = BevEyes(config)
         self.told = ToldEncoder(config.told, config.token)
         self.down = nn.Sequential(
-            conv_block(config.channels + len(config.told) * config.token, 48, stride=2),
+            conv_block(CHANNELS + len(config.told) * config.token, 48, stride=2),
             conv_block(48, 64, stride=2),
             conv_block(64, 24, stride=2),
         )

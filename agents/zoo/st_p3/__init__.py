@@ -4,4 +4,4 @@ from agents.zoo.st_p3.config import CONFIGS
 from agents.zoo.st_p3.model import StP3
 from agents.zoo.system import System
 
-SYSTEM = System(configs=CONFIGS, model=StP3)
+SYSTEM = System(configs=CONFIGS, model=StP3, eyes="driveinsight")

@@ -13,8 +13,6 @@ class StP3Config(SystemConfig):
     """What it sees, and the sizes of its network.
 
     Attributes:
-        image_width: Channels of the first layer over images.
-        channels: Of the map of the ground.
         future: Of the map that is rolled forward, at half as many cells.
         latent: Of the noise that tells futures apart.
         gru: Width of the GRU that refines.
@@ -26,15 +24,13 @@ class StP3Config(SystemConfig):
     odometry: bool = True
     past: int = 2
     labels: tuple[str, ...] = ("semantics", "future")
-    image_width: int = 16
-    channels: int = 32
     future: int = 48
     latent: int = 16
     gru: int = 64
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_sizes(self, "image_width", "channels", "future", "latent", "gru")
+        check_sizes(self, "future", "latent", "gru")
 
 
 CONFIGS = {"st-p3": StP3Config()}

@@ -28,7 +28,7 @@ from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import STEP_M
 from agents.zoo.commands import command_of
 from agents.zoo.errors import waypoint_error
-from agents.zoo.eyes import BEV, BevEyes
+from agents.zoo.eyes import BEV, CHANNELS, BevEyes
 from agents.zoo.raster import RasterChannel
 from agents.zoo.st_p3.config import StP3Config
 from agents.zoo.st_p3.paths import path_costs, sampled_paths
@@ -52,11 +52,11 @@ class Rolling(nn.Module):
         super().__init__()
         width = config.future
         self.steps = config.waypoints
-        self.enter = conv_block(config.channels, width, stride=2)
+        self.enter = conv_block(CHANNELS, width, stride=2)
         self.noise = nn.Linear(width, 2 * config.latent)
         self.drawn, self.plain = SpatialGru(config.latent, width), SpatialGru(width, width)
-        self.leave = nn.Conv2d(width, config.channels, 1)
-        self.mix = conv_block(config.channels, config.channels)
+        self.leave = nn.Conv2d(width, CHANNELS, 1)
+        self.mix = conv_block(CHANNELS, CHANNELS)
 
     def forward(self, now: Tensor) -> Tensor:
         """(B, C, X, Y) to (B, T, C, X, Y)."""
@@ -101,17 +101,16 @@ class StP3(SystemModel):
     def __init__(self, config: StP3Config) -> None:
         super().__init__()
         self.config: StP3Config = config
-        channels = config.channels
-        self.eyes = BevEyes(config, channels, config.image_width)
+        self.eyes = BevEyes(config)
         self.temporal = nn.Sequential(
-            conv_block(channels, channels), conv_block(channels, channels)
+            conv_block(CHANNELS, CHANNELS), conv_block(CHANNELS, CHANNELS)
         )
         self.roll = Rolling(config)
-        self.now = nn.Conv2d(channels, 4, 1)
-        self.later = nn.Conv2d(channels, 2, 1)
-        self.cost = nn.Conv2d(channels, 1, 1)
+        self.now = nn.Conv2d(CHANNELS, 4, 1)
+        self.later = nn.Conv2d(CHANNELS, 2, 1)
+        self.cost = nn.Conv2d(CHANNELS, 1, 1)
         self.speed, self.command, self.target = Tap(), Tap(), Tap()
-        self.start = nn.Linear(channels, config.gru)
+        self.start = nn.Linear(CHANNELS, config.gru)
         self.cell = nn.GRUCell(6, config.gru)
         self.step = nn.Linear(config.gru, 2)
 

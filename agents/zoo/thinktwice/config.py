@@ -13,8 +13,6 @@ class ThinkTwiceConfig(SystemConfig):
     """What it sees, and the sizes of its network.
 
     Attributes:
-        image_width: Channels of the first layer over images.
-        channels: Of the map of the ground.
         levels: Of its own maps, each half as large as the one before.
         token: Width of what encodes each component that it is told.
         width: Of what it plans from.
@@ -32,11 +30,9 @@ class ThinkTwiceConfig(SystemConfig):
     odometry: bool = True
     past: int = 1
     labels: tuple[str, ...] = ("action", "raster", "future")
-    image_width: int = 12
-    channels: int = 32
-    levels: tuple[int, ...] = (32, 40, 48, 48)
+    levels: tuple[int, ...] = (32, 32, 40, 40)
     token: int = 32
-    width: int = 88
+    width: int = 64
     rolled: int = 32
     layers: int = 2
     looks: int = 4
@@ -47,7 +43,7 @@ class ThinkTwiceConfig(SystemConfig):
         super().__post_init__()
         for name in ("levels", "teacher"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_sizes(self, "image_width", "channels", "levels", "token", "width", "rolled", "layers")
+        check_sizes(self, "levels", "token", "width", "rolled", "layers")
         check_sizes(self, "looks", "teacher", "teacher_width")
         if len(self.levels) != 4 or len(self.teacher) < 4:
             raise ValueError("it has four levels, and its teacher has as many or more")

@@ -24,7 +24,7 @@ from agents.networks.mlp import mlp
 from agents.networks.raster_teacher import RasterTeacher, TeacherOutput
 from agents.networks.waypoint_heads import StepsHead
 from agents.zoo.errors import action_error, waypoint_error
-from agents.zoo.eyes import BEV, BevEyes, Recall
+from agents.zoo.eyes import BEV, CHANNELS, BevEyes, Recall
 from agents.zoo.raster import GRID, RasterChannel
 from agents.zoo.system import Labels, Output, Seen, State, TaughtModel
 from agents.zoo.thinktwice.config import ThinkTwiceConfig
@@ -43,7 +43,7 @@ class Pyramid(nn.Module):
     def __init__(self, config: ThinkTwiceConfig) -> None:
         super().__init__()
         widths = config.levels
-        self.levels = nn.ModuleList([conv_block(config.channels, widths[0])])
+        self.levels = nn.ModuleList([conv_block(CHANNELS, widths[0])])
         self.levels.extend(conv_block(fine, coarse, stride=2) for fine, coarse in pairwise(widths))
         self.last = conv_block(widths[-1], 32, stride=2)
         side = BEV.cells // 2 ** len(widths)
@@ -68,8 +68,8 @@ class ThinkTwice(TaughtModel):
         self.teacher = RasterTeacher(
             len(RasterChannel), GRID.cells, config.teacher, config.teacher_width, config.waypoints
         ).requires_grad_(False)
-        self.eyes = BevEyes(config, config.channels, config.image_width)
-        self.recall = Recall(config.channels, recurrent=False)
+        self.eyes = BevEyes(config)
+        self.recall = Recall(recurrent=False)
         self.pyramid = Pyramid(config)
         self.as_teacher = nn.ModuleList(
             nn.Conv2d(ours, theirs, 1)

@@ -4,4 +4,4 @@ from agents.zoo.system import System
 from agents.zoo.vad.config import CONFIGS
 from agents.zoo.vad.model import Vad
 
-SYSTEM = System(configs=CONFIGS, model=Vad)
+SYSTEM = System(configs=CONFIGS, model=Vad, eyes="driveinsight")

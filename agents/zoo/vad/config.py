@@ -13,8 +13,6 @@ class VadConfig(SystemConfig):
     """What it sees, and the sizes of its network.
 
     Attributes:
-        image_width: Channels of the first layer over images.
-        channels: Of the map of the ground.
         width: Of a query.
         heads: Of attention.
         layers: In which queries look at the map.
@@ -30,8 +28,6 @@ class VadConfig(SystemConfig):
     past: int = 2
     waypoints: int = 6
     labels: tuple[str, ...] = ("objects", "motion", "map")
-    image_width: int = 16
-    channels: int = 40
     width: int = 80
     heads: int = 4
     layers: int = 2
@@ -41,7 +37,7 @@ class VadConfig(SystemConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_sizes(self, "image_width", "channels", "width", "heads", "layers")
+        check_sizes(self, "width", "heads", "layers")
         check_sizes(self, "agents", "lines", "modes")
         if self.width % self.heads:
             raise ValueError(f"{self.heads} heads do not share a width of {self.width} evenly")

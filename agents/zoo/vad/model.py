@@ -18,7 +18,7 @@ from agents.networks.mlp import mlp
 from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import STEP_M
 from agents.zoo.commands import COMMANDS, command_of
-from agents.zoo.eyes import BEV, BevEyes, Recall
+from agents.zoo.eyes import BEV, CHANNELS, BevEyes, Recall
 from agents.zoo.system import Labels, Output, Seen, State, SystemModel
 from agents.zoo.vad.config import VadConfig
 from agents.zoo.vad.losses import vad_losses
@@ -92,9 +92,9 @@ class Vad(SystemModel):
         super().__init__()
         self.config: VadConfig = config
         width, side = config.width, BEV.cells // _COARSER
-        self.eyes = BevEyes(config, config.channels, config.image_width)
-        self.recall = Recall(config.channels, recurrent=True)
-        self.enter = conv_block(config.channels, width, stride=_COARSER)
+        self.eyes = BevEyes(config)
+        self.recall = Recall(recurrent=True)
+        self.enter = conv_block(CHANNELS, width, stride=_COARSER)
         self.place = nn.Parameter(torch.randn(1, side * side, width) * 0.1)
         self.queries = Queries(config)
         self.ego = nn.Parameter(torch.randn(1, 1, width) * 0.5)

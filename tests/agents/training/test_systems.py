@@ -8,19 +8,23 @@ import pytest
 import torch
 
 from agents import AGENTS, AgentSpecError, load_agent
+from agents.driveinsight.weights import from_pretrained, weights_digest
 from agents.explain.look import look_at
 from agents.networks.weights import WeightsError
 from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig
+from agents.training.distributed import ALONE
 from agents.training.frames import read_drive
 from agents.training.learning import Training
 from agents.training.loading import Samples, batches, town_of
 from agents.training.moments import load_moments
 from agents.training.samples import batch_of
+from agents.training.session import TrainingPlan, begin
 from agents.training.trainees import config_named, trainee_from, trainee_of
 from agents.training.variation import NO_VARIATION
+from agents.zoo.eyes import BevEyes
 from agents.zoo.inputs import inputs_of
-from agents.zoo.registry import network_of, system_names
+from agents.zoo.registry import network_of, system_names, system_of
 from agents.zoo.weights import load_system, save_system
 from tests.agents.training.small_policies import on_disk
 
@@ -96,6 +100,34 @@ def test_one_batch_is_learnt_by_heart(name, moments):
     mixed = dataclasses.replace(by_heart, precision="bfloat16")
     rounded = Training.begin(config, mixed, "cpu").update(batch)
     assert rounded["total"] == pytest.approx(first["total"], rel=0.05), (first, rounded)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if system_of(name).eyes])
+def test_cameras_begin_as_those_of_the_policy_that_a_system_names(name):
+    trainee = trainee_of(config_named(name))
+    theirs = from_pretrained(trainee.pretrained).perception.camera.views.state_dict()
+    torch.manual_seed(0)
+    begun = trainee.network()
+    torch.manual_seed(0)
+    fresh = network_of(trainee.config).state_dict()
+    eyes = next(part for part in begun.modules() if isinstance(part, BevEyes))
+    path = next(name for name, part in begun.named_modules() if part is eyes)
+    for tensor, value in begun.state_dict().items():
+        _, of_cameras, own = tensor.partition(f"{path}.views.")
+        assert torch.equal(value, theirs[own] if of_cameras else fresh[tensor]), tensor
+    assert f"began as those of `{trainee.pretrained.name}`" in "".join(trainee.about(begun))
+
+
+def test_what_cameras_began_as_is_part_of_what_is_trained(drives, tmp_path):
+    plan = TrainingPlan(
+        policy=config_named("vad"),
+        training=TrainConfig(steps=1, batch=1),
+        data=(drives,),
+        folder=tmp_path,
+    )
+    session = begin(plan, ALONE, "cpu")
+    trainee = session.training.trainee
+    assert session.training.config.init_from == weights_digest(trainee.pretrained)
 
 
 @pytest.mark.parametrize("untrained", NAMES, indirect=True)
