@@ -1,7 +1,7 @@
 """Cameras, and a LiDAR where a system has one, to one map of the ground, and what is remembered.
 
 By the encoders of the paper's policy. Training begins with what that policy's cameras have learnt:
-what makes a system itself comes after them, and 60,000 samples do not teach both.
+what makes a system itself comes after them.
 """
 
 from __future__ import annotations
