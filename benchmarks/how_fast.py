@@ -122,7 +122,12 @@ def main() -> None:
         drive_s = evaluated_s()
     print(f"CPU {cpu_capability()}\n\n| what | measured |\n|---|---:|")
     for name, found in rates.items():
-        print(f"| {name} | {statistics.median(found):,.4g} a second |")
+        rate = statistics.median(found)
+        print(
+            f"| {name} | {rate:,.0f} a second |"
+            if rate >= 10
+            else f"| {name} | {rate:.2g} a second |"
+        )
     drives = f"`driveinsight {' '.join(EVALUATE)}`: ten routes, 13 km, scenarios on"
     print(f"| {drives} | {drive_s:.0f} s |")
     print(f"| first run: compile the kernels, parse the town, three steps | {cold_s:.0f} s, once |")
