@@ -17,7 +17,9 @@ import torch
 from rich.console import Console
 from rich.progress import track
 
-from agents.training.config import TrainConfig
+from agents.networks.weights import WeightsError
+from agents.training.config import TrainConfig, TrainingError
+from agents.training.frames import DriveFileError
 from agents.training.loading import Samples
 from agents.training.moments import load_moments
 from agents.training.samples import Batch, batch_of
@@ -54,12 +56,15 @@ def main() -> None:
     if arguments.moments < BATCH:
         parser.error(f"--moments must be at least {BATCH}, not {arguments.moments}")
     torch.set_num_threads(1)
-    network = load_system(arguments.system).eval()
     # as recipes keep drives out, so that none was learnt from
     config = TrainConfig(
         steps=1, batch=BATCH, held_out=0.05, measured_moments=arguments.moments // BATCH * BATCH
     )
-    moments = load_moments([arguments.data], config.standing_share)
+    try:
+        network = load_system(arguments.system).eval()
+        moments = load_moments([arguments.data], config.standing_share)
+    except (WeightsError, TrainingError, DriveFileError) as error:
+        parser.error(str(error))
     samples = Samples(network.config, config, moments)
     plans: dict[str, list[np.ndarray]] = {mode: [] for mode in MODES}
     truths, valid = list[np.ndarray](), list[np.ndarray]()
