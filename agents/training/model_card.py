@@ -34,7 +34,7 @@ def about_policy(network: nn.Module, config: PolicyConfig) -> tuple[str, ...]:
 def about_system(network: nn.Module, config: SystemConfig) -> tuple[str, ...]:
     """What a system of the zoo is: the title, and a paragraph each."""
     eyes = system_of(config.system).eyes
-    begun = f" Its cameras' encoders began as those of `{eyes}`, and learnt on." if eyes else ""
+    begun = f" Its cameras' encoders are those of `{eyes}`, and learnt no more." if eyes else ""
     return (
         f"# System `{config.name}`",
         f"{_size(network):,} parameters; sees {config.inputs}; {config.waypoints} waypoints "

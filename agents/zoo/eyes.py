@@ -1,6 +1,6 @@
 """Cameras, and a LiDAR where a system has one, to one map of the ground, and what is remembered.
 
-By the encoders of the paper's policy. Training begins with what that policy's cameras have learnt:
+By the encoders of the paper's policy. Its cameras are what that policy's have learnt, and stay so:
 what makes a system itself comes after them.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
+from typing_extensions import Self
 
 from agents.driveinsight.camera import ImageEncoder, image_groups
 from agents.driveinsight.config import CameraEncoderConfig, LidarEncoderConfig
@@ -67,10 +68,20 @@ class BevEyes(nn.Module):
         return self.bev(self.fusion(maps)), ahead[0]
 
     def learnt_by(self, policy: Policy) -> None:
-        """Takes over what another policy's cameras have learnt; its rig is of the same sizes."""
+        """Takes over what another policy's cameras have learnt; they learn no more.
+
+        Its rig is of the same sizes.
+        """
         assert policy.perception is not None, "it has no eyes"
         assert policy.perception.camera is not None, "it has no cameras"
         self.views.load_state_dict(policy.perception.camera.views.state_dict())
+        self.views.requires_grad_(False)
+
+    def train(self, mode: bool = True) -> Self:
+        """All but cameras that learn no more: their norms stay as they are, too."""
+        super().train(mode)
+        self.views.train(mode and any(each.requires_grad for each in self.views.parameters()))
+        return self
 
     def maps(self, path: str) -> dict[str, FeatureMap]:
         """Its maps, for an anatomy; the module's dotted path is `path`."""

@@ -201,8 +201,8 @@ class System:
     Attributes:
         configs: Its configurations by their names in the table of agents.
         model: Of its network, which is made from a configuration.
-        eyes: Shipped policy whose cameras its own, `eyes.BevEyes`, are when training begins; empty
-            for fresh ones.
+        eyes: Shipped policy whose cameras are its own, `eyes.BevEyes`, and are not trained again;
+            empty for fresh ones, which learn.
     """
 
     configs: Mapping[str, SystemConfig]

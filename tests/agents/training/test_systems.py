@@ -103,7 +103,7 @@ def test_one_batch_is_learnt_by_heart(name, moments):
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if system_of(name).eyes])
-def test_cameras_begin_as_those_of_the_policy_that_a_system_names(name):
+def test_cameras_are_those_of_the_policy_that_a_system_names(name):
     trainee = trainee_of(config_named(name))
     theirs = from_pretrained(trainee.pretrained).perception.camera.views.state_dict()
     torch.manual_seed(0)
@@ -115,10 +115,16 @@ def test_cameras_begin_as_those_of_the_policy_that_a_system_names(name):
     for tensor, value in begun.state_dict().items():
         _, of_cameras, own = tensor.partition(f"{path}.views.")
         assert torch.equal(value, theirs[own] if of_cameras else fresh[tensor]), tensor
-    assert f"began as those of `{trainee.pretrained.name}`" in "".join(trainee.about(begun))
+    assert f"are those of `{trainee.pretrained.name}`" in "".join(trainee.about(begun))
+    assert not [
+        part for part in begun.train().modules() if part.training and part in eyes.views.modules()
+    ]
+    learning = {name for name, each in begun.named_parameters() if each.requires_grad}
+    assert learning
+    assert not [name for name in learning if name.startswith(f"{path}.views.")]
 
 
-def test_what_cameras_began_as_is_part_of_what_is_trained(drives, tmp_path):
+def test_whose_cameras_it_has_is_part_of_what_is_trained(drives, tmp_path):
     plan = TrainingPlan(
         policy=config_named("vad"),
         training=TrainConfig(steps=1, batch=1),
