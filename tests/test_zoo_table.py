@@ -1,0 +1,88 @@
+"""The zoo's order beside the paper's: which systems are compared, and how sure the figure is."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from benchmarks.zoo_table import TABLE_1, rank_line, success_rate
+from di_envs.world.kinds import EventKind
+from leaderboard.scoring.score import Score
+from tests.leaderboard.made_records import event, route, run_of
+
+PAPER = (
+    "st-p3",
+    "lbc",
+    "vad",
+    "transfuser",
+    "driveinsight-town05",
+    "interfuser",
+)  # on Long, upwards
+
+
+def driven(name, scores):
+    """A run on Long with so many points on each route."""
+    records = [
+        route(str(index), index=index, score=Score(route_completion=score, infraction_score=1.0))
+        for index, score in enumerate(scores)
+    ]
+    return run_of(*records, agent=name, seeds=(0,))
+
+
+def line(points):
+    """What is said of systems with these points on each route, in the paper's order upwards."""
+    found = {
+        name: {"town05_long": driven(name, each)} for name, each in zip(PAPER, points, strict=True)
+    }
+    return rank_line("town05_long", found)
+
+
+def numbers(text):
+    return [float(each) for each in re.findall(r"[-+]\d\.\d\d", text)]
+
+
+def test_the_papers_order_is_one_and_the_other_way_round_is_minus_one():
+    assert [TABLE_1[name].ds("town05_long") for name in PAPER] == sorted(
+        TABLE_1[name].ds("town05_long") for name in PAPER
+    )
+    points = [[10.0 * n, 10.0 * n + 5.0] * 5 for n in range(1, 7)]
+    assert numbers(line(points))[0] == 1.0
+    assert numbers(line(points[::-1]))[0] == -1.0
+
+
+def test_two_that_change_places_cost_what_spearman_says_and_the_interval_is_fishers():
+    points = [[score] * 10 for score in (20.0, 10.0, 30.0, 40.0, 50.0, 60.0)]
+    rho = 1.0 - 6.0 * 2.0 / (6.0 * 35.0)  # two ranks are one off
+    value, low, high, from_, to = numbers(line(points))
+    assert value == pytest.approx(rho, abs=0.005)
+    assert low == high == value, "routes that are all alike say the same however they are drawn"
+    spread = 1.96 * math.sqrt(1.06 / 3.0)
+    assert from_ == pytest.approx(math.tanh(math.atanh(rho) - spread), abs=0.005)
+    assert to == pytest.approx(math.tanh(math.atanh(rho) + spread), abs=0.005)
+
+
+def test_an_order_that_hangs_on_few_routes_is_not_sure():
+    steady = [[10.0 * n] * 10 for n in range(1, 6)]
+    _, low, high, *_ = numbers(line([[0.0] * 8 + [100.0] * 2, *steady]))
+    assert low < high
+
+
+def test_other_routes_cannot_be_told_where_systems_drove_different_ones():
+    found = {
+        name: {"town05_long": driven(name, [10.0 * n] * (10 + n))} for n, name in enumerate(PAPER)
+    }
+    assert "the runs are not of the same routes" in rank_line("town05_long", found)
+
+
+def test_a_system_that_the_paper_has_twice_or_not_at_all_is_not_compared():
+    names = ("lbc", "mile", "ppo", "driveinsight")
+    found = {name: {"town05_long": driven(name, [50.0])} for name in names}
+    assert "2 systems are in both: too few" in rank_line("town05_long", found)
+
+
+def test_a_success_is_a_whole_route_without_a_scored_infraction():
+    half = route("2", score=Score(route_completion=50.0, infraction_score=1.0))
+    red = route("3", events=(event(EventKind.RED_LIGHT, other=3),))
+    assert success_rate(run_of(route("1"), half, red, route("4"), seeds=(0,))) == 50.0
