@@ -9,6 +9,7 @@ from agents.training.recipes.driving import CollectStage, CorrectStage, run_coll
 from agents.training.recipes.kinds import Product, StageKind
 from agents.training.recipes.looking import CacheStage, run_cache
 from agents.training.recipes.perceiving import PerceiveStage, run_perceive
+from agents.training.recipes.shipped import ShippedStage, run_shipped
 from agents.training.recipes.training import PlanStage, TrainStage, run_train
 
 STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
@@ -42,6 +43,13 @@ STAGE_KINDS: Mapping[str, StageKind] = MappingProxyType(
             makes=Product.SEEN,
             takes={"eyes": Product.POLICY, "data": Product.DRIVES},
             run=run_cache,
+        ),
+        "shipped": StageKind(
+            summary="a policy that comes with the package",
+            settings=ShippedStage,
+            makes=Product.POLICY,
+            takes={},
+            run=run_shipped,
         ),
         "plan": StageKind(
             summary="a planner learns alone, from encoded moments",
