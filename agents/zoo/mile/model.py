@@ -22,6 +22,7 @@ from torch import Tensor, nn
 from agents.driveinsight.semantics import BevClass
 from agents.explain.protocol import Anatomy, TokenGroup
 from agents.networks.blocks import conv_block
+from agents.networks.initial import begin_as_he
 from agents.networks.mlp import mlp
 from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import StepsHead
@@ -99,6 +100,7 @@ class Mile(SystemModel):
         self.action = nn.Sequential(nn.Linear(width, 2), nn.Tanh())
         self.plan = StepsHead(width, config.waypoints)
         self.decode = Decoder(memory + latent)
+        begin_as_he(self)  # the way from route to plan is ten layers long
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         if state is None:
