@@ -4,7 +4,8 @@
     python benchmarks/waypoints.py agents/zoo/transfuser/weights/transfuser --data runs/zoo/expert
 
 Of each waypoint the mean distance along the car and to its side, as it sees and with black cameras
-and an empty LiDAR; beside them how far what was driven is from a car that goes straight on.
+and an empty LiDAR, and Pearson's correlation of what was planned and driven to the side: about 0 is
+who does not steer; beside them how far what was driven is from a car that goes straight on.
 """
 
 from __future__ import annotations
@@ -44,6 +45,12 @@ def planned(network: SystemModel, batch: Batch, *, blind: bool) -> np.ndarray:
     return output.waypoints.float().numpy()
 
 
+def _likeness(plan: np.ndarray, driven: np.ndarray) -> tuple[float, float, float]:
+    """Of (N, 2) places: mean distances along and aside [m], and the correlation of those aside."""
+    along, aside = np.abs(plan - driven).mean(axis=0)
+    return along, aside, np.corrcoef(plan[:, 1], driven[:, 1])[0, 1]
+
+
 def main() -> None:
     """Prints a row for each waypoint."""
     parser = argparse.ArgumentParser(
@@ -77,15 +84,17 @@ def main() -> None:
         truths.append(batch.targets["waypoints"].numpy())
         valid.append(batch.targets["valid"].numpy() > 0.0)
     truth, known = np.concatenate(truths), np.concatenate(valid)
-    off = {mode: np.abs(np.concatenate(plans[mode]) - truth) for mode in MODES}
+    planned_by = {mode: np.concatenate(plans[mode]) for mode in MODES}
     print(f"{network.config.name}, {len(truth)} moments\n")
-    print("| after [s] | moments | along [m] | aside [m] | blind: along | aside | truth aside |")
-    print("|---:|---:|---:|---:|---:|---:|---:|")
+    of_mode = "along [m] | aside [m] | r aside"
+    print(f"| after [s] | moments | {of_mode} | blind: {of_mode} | truth aside [m] |")
+    print("|" + "---:|" * 9)
     for step in range(truth.shape[1]):
         there = known[:, step]
-        cells = [off[mode][there, step].mean(axis=0) for mode in MODES]
+        driven = truth[there, step]
+        cells = [_likeness(planned_by[mode][there, step], driven) for mode in MODES]
         row = " | ".join(f"{value:.2f}" for cell in cells for value in cell)
-        aside = np.abs(truth[there, step, 1]).mean()
+        aside = np.abs(driven[:, 1]).mean()
         print(f"| {MOMENT_DT_S * (step + 1):.1f} | {there.sum()} | {row} | {aside:.2f} |")
 
 

@@ -100,7 +100,9 @@ class Mile(SystemModel):
         self.action = nn.Sequential(nn.Linear(width, 2), nn.Tanh())
         self.plan = StepsHead(width, config.waypoints)
         self.decode = Decoder(memory + latent)
-        begin_as_he(self)  # the way from route to plan is ten layers long
+        # the way from route to plan is ten layers long
+        for part in (self.observe, self.prior, self.posterior, self.policy, self.plan.steps[0]):
+            begin_as_he(part)
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         if state is None:

@@ -7,6 +7,8 @@ kinds of query go through the same layers; a narrow camera ahead.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 
@@ -14,6 +16,7 @@ from agents.driveinsight.rows import METRES
 from agents.explain.protocol import Anatomy, TokenGroup
 from agents.networks.blocks import conv_block
 from agents.networks.decoder import DecoderLayer, MixingLayer
+from agents.networks.looking import features_at
 from agents.networks.mlp import mlp
 from agents.networks.taps import Tap
 from agents.networks.waypoint_heads import STEP_M
@@ -26,10 +29,32 @@ from di_envs.town.map_chunks import POINTS, MapKind
 
 BOX = 8  # x, y, log length, log width, sine, cosine of the heading, velocity
 _COARSER = 2  # cells of the ground to a token
+_SIDE = BEV.cells // _COARSER
+_WAVES_M = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
+
+
+class Places(nn.Module):
+    """Places on the ground as waves of several lengths, the same for cells and for queries."""
+
+    waves: Tensor
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        waves = 2.0 * math.pi / torch.tensor(_WAVES_M)
+        self.register_buffer("waves", waves, persistent=False)
+        self.enter = nn.Linear(4 * len(_WAVES_M), width)
+
+    def forward(self, places: Tensor) -> Tensor:
+        """(..., 2) x, y [m] to (..., width)."""
+        phases = (places[..., None] * self.waves).flatten(-2)
+        found: Tensor = self.enter(torch.cat([phases.sin(), phases.cos()], dim=-1))
+        return found
 
 
 class Queries(nn.Module):
     """Queries for others and for lines, which look at the ground, to vectors."""
+
+    cells: Tensor
 
     def __init__(self, config: VadConfig) -> None:
         super().__init__()
@@ -38,6 +63,12 @@ class Queries(nn.Module):
         self.query = nn.Parameter(torch.randn(1, count, width) * 0.5)
         spread = torch.rand(1, count, 2) * 2.0 - torch.tensor([0.4, 1.0])
         self.anchor = nn.Parameter(spread)  # where each looks for something, in `METRES`
+        self.there = nn.Linear(width, width)
+        along = (torch.arange(_SIDE) + 0.5) / _SIDE
+        x = BEV.x_min_m + (BEV.x_max_m - BEV.x_min_m) * along
+        y = BEV.y_min_m + (BEV.y_max_m - BEV.y_min_m) * along
+        cells = torch.cartesian_prod(x, y)  # (_SIDE * _SIDE, 2) centres, x by y
+        self.register_buffer("cells", cells, persistent=False)
         self.mix = nn.ModuleList(MixingLayer(width, config.heads) for _ in range(config.layers))
         self.look = nn.ModuleList(DecoderLayer(width, config.heads) for _ in range(config.layers))
         self.agents, self.lines = Tap(), Tap()
@@ -45,9 +76,15 @@ class Queries(nn.Module):
         self.motion = mlp_to(width, config.modes * (2 * config.waypoints + 1))
         self.line = mlp_to(width, len(MapKind) + 2 * POINTS)
 
-    def forward(self, ground: Tensor) -> dict[str, Tensor]:
-        """(B, N, width) to `agents`, `lines` (B, Q, width), and what they say; see `_said`."""
-        query = self.query.expand(len(ground), -1, -1)
+    def forward(self, ground: Tensor, where: Places) -> dict[str, Tensor]:
+        """(B, width, X, Y) to `agents`, `lines` (B, Q, width), and what they say; see `_said`.
+
+        Each begins with its place and with what is there, as reference points have it in Zhu et
+        al., Deformable DETR, ICLR 2021.
+        """
+        places = METRES * self.anchor.expand(len(ground), -1, -1)
+        query = self.query + where(places) + self.there(features_at(ground, places, BEV))
+        ground = ground.flatten(2).transpose(1, 2) + where(self.cells)  # (B, N, width)
         for mix, look in zip(self.mix, self.look, strict=True):
             query = look(mix(query), ground)
         parts = query.split([self.config.agents, self.config.lines], dim=1)
@@ -91,11 +128,11 @@ class Vad(SystemModel):
     def __init__(self, config: VadConfig) -> None:
         super().__init__()
         self.config: VadConfig = config
-        width, side = config.width, BEV.cells // _COARSER
+        width = config.width
         self.eyes = BevEyes(config)
         self.recall = Recall(recurrent=True)
         self.enter = conv_block(CHANNELS, width, stride=_COARSER)
-        self.place = nn.Parameter(torch.randn(1, side * side, width) * 0.1)
+        self.where = Places(width)
         self.queries = Queries(config)
         self.ego = nn.Parameter(torch.randn(1, 1, width) * 0.5)
         # vectors, not only queries, are what the ego asks
@@ -113,8 +150,7 @@ class Vad(SystemModel):
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         bev, _ = self.eyes(seen)
         bev, state = self.recall(bev, seen["odometry"], state)
-        ground = self.enter(bev).flatten(2).transpose(1, 2) + self.place  # (B, N, width)
-        said = self.queries(ground)
+        said = self.queries(self.enter(bev), self.where)
         ego = self.ego.expand(len(bev), -1, -1)
         to_agents = self.ask_agents(ego, said["agents"] + self.of_agents(self._vectors(said)))
         to_lines = self.ask_lines(to_agents, said["lines"] + self.of_lines(self._polylines(said)))

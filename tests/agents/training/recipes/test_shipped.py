@@ -41,5 +41,5 @@ def test_it_is_there_as_shipped_and_taken_once(written, tmp_path):
 
 
 def test_a_policy_that_is_not_shipped_is_refused_with_the_nearest(written):
-    with pytest.raises(RecipeError, match="'rout-only'.*did you mean 'route-only'"):
+    with pytest.raises(RecipeError, match=r"'rout-only'.*did you mean 'route-only'"):
         written(RECIPE.replace("route-only", "rout-only"))
