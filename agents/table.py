@@ -180,6 +180,7 @@ AGENTS: dict[str, AgentEntry] = {
         "driveadapter",
         "driveadapter:DriveAdapterAgent",
         "masks for a frozen teacher, with adapters",
+        score="95.0",
     ),
     "constant": AgentEntry(
         entry_point="agents.constant:ConstantAgent",

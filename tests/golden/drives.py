@@ -142,6 +142,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     "interfuser on town05_short": GoldenDrive(
         agent="interfuser", suite="town05_short", route="8", seconds=2.0
     ),
+    "driveadapter on town05_short": GoldenDrive(
+        agent="driveadapter", suite="town05_short", route="8", seconds=2.0
+    ),
     "ppo on town05_short": GoldenDrive(agent="ppo", suite="town05_short", route="8", seconds=3.0),
     "lbc-teacher on town05_short": GoldenDrive(
         agent="lbc-teacher", suite="town05_short", route="8", seconds=3.0
