@@ -8,8 +8,8 @@ from torch import nn
 def begin_as_he(network: nn.Module) -> None:
     """Weights of linear layers and convolutions as He et al. draw them, and biases of 0; in place.
 
-    By torch's own a layer passes on a sixth of its input's variance: after ten of them without a
-    norm or a shortcut, biases are all that is left to tell samples apart, and there are none.
+    By torch's own a layer with a ReLU passes on a sixth of what its input varies by: after ten of
+    them without a norm or a shortcut biases alone are left, which tell no two samples apart.
     Source: He et al., Delving Deep into Rectifiers, ICCV 2015.
     """
     for module in network.modules():
