@@ -23,7 +23,7 @@ class VadConfig(SystemConfig):
 
     system: str = "vad"
     cameras: tuple[str, ...] = tuple(camera.name for camera in FAMILY.cameras)
-    told: tuple[str, ...] = ("command",)
+    told: tuple[str, ...] = ("command", "speed")
     odometry: bool = True
     past: int = 2
     waypoints: int = 6

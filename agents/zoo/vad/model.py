@@ -1,8 +1,9 @@
 """A scene as vectors: queries for others and for lines; the ego's asks the former, then the latter.
 
 Source: Jiang et al., VAD: Vectorized Scene Representation for Efficient Autonomous Driving, ICCV
-2023. What we changed: sizes; pictures are lifted by depth instead of by queries of the ground; both
-kinds of query go through the same layers; a narrow camera ahead.
+2023. What we changed: sizes; pictures are lifted by depth instead of by queries of the ground, which
+is told the speed, not all that the bus of the car says; both kinds of query go through the same
+layers; a narrow camera ahead.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from agents.networks.waypoint_heads import STEP_M
 from agents.zoo.commands import COMMANDS, command_of
 from agents.zoo.eyes import BEV, CHANNELS, BevEyes, Recall
 from agents.zoo.system import Labels, Output, Seen, State, SystemModel
+from agents.zoo.told import ToldEncoder
 from agents.zoo.vad.config import VadConfig
 from agents.zoo.vad.losses import vad_losses
 from di_envs.town.map_chunks import POINTS, MapKind
@@ -130,6 +132,7 @@ class Vad(SystemModel):
         self.config: VadConfig = config
         width = config.width
         self.eyes = BevEyes(config)
+        self.moving = ToldEncoder(("speed",), CHANNELS)
         self.recall = Recall(recurrent=True)
         self.enter = conv_block(CHANNELS, width, stride=_COARSER)
         self.where = Places(width)
@@ -149,6 +152,7 @@ class Vad(SystemModel):
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         bev, _ = self.eyes(seen)
+        bev = bev + self.moving(seen)[:, 0, :, None, None]
         bev, state = self.recall(bev, seen["odometry"], state)
         said = self.queries(self.enter(bev), self.where)
         ego = self.ego.expand(len(bev), -1, -1)
@@ -180,5 +184,6 @@ class Vad(SystemModel):
             "agents": TokenGroup(tap="queries.agents"),
             "lines": TokenGroup(tap="queries.lines"),
             "command": TokenGroup(tap="command"),
+            **self.moving.groups("moving"),
         }
         return Anatomy(groups=groups, maps=self.eyes.maps("eyes"))
