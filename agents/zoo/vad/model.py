@@ -1,7 +1,7 @@
 """A scene as vectors: queries for others and for lines; the ego's asks the former, then the latter.
 
 Source: Jiang et al., VAD: Vectorized Scene Representation for Efficient Autonomous Driving, ICCV
-2023. What we changed: sizes; pictures are lifted by depth instead of by queries of the ground, which
+2023. What we changed: sizes; pictures are lifted by depth instead of by queries of the ground; that
 is told the speed, not all that the bus of the car says; both kinds of query go through the same
 layers; a narrow camera ahead.
 """
