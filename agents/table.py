@@ -171,7 +171,9 @@ AGENTS: dict[str, AgentEntry] = {
         "lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras", score="41.8"
     ),
     "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),
-    "mile": _system("mile", "mile:MileAgent", "a model of the world, which can imagine too"),
+    "mile": _system(
+        "mile", "mile:MileAgent", "a model of the world, which can imagine too", score="75.0"
+    ),
     "st-p3": _system("st-p3", "st_p3:StP3Agent", "what comes as occupancy, and the cheapest path"),
     "thinktwice": _system(
         "thinktwice", "thinktwice:ThinkTwiceAgent", "a plan, mended by what comes if it is driven"
