@@ -170,7 +170,9 @@ AGENTS: dict[str, AgentEntry] = {
     "lbc": _system(
         "lbc", "lbc:LbcAgent", "Learning by Cheating: the student with cameras", score="41.8"
     ),
-    "vad": _system("vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks"),
+    "vad": _system(
+        "vad", "vad:VadAgent", "others and lines as vectors, which an ego query asks", score="41.8"
+    ),
     "mile": _system(
         "mile", "mile:MileAgent", "a model of the world, which can imagine too", score="75.0"
     ),

@@ -146,6 +146,7 @@ GOLDEN: dict[str, GoldenDrive] = {
         agent="driveadapter", suite="town05_short", route="8", seconds=2.0
     ),
     "mile on town05_short": GoldenDrive(agent="mile", suite="town05_short", route="8", seconds=2.0),
+    "vad on town05_short": GoldenDrive(agent="vad", suite="town05_short", route="8", seconds=2.0),
     "ppo on town05_short": GoldenDrive(agent="ppo", suite="town05_short", route="8", seconds=3.0),
     "lbc-teacher on town05_short": GoldenDrive(
         agent="lbc-teacher", suite="town05_short", route="8", seconds=3.0
