@@ -45,7 +45,8 @@ def interaction(first: Comparison, second: Comparison, both: Comparison) -> Boot
     return clustered_interval(values, [costs[2][key].before.route_hash for key in shared])
 
 
-def _shown(interval: BootstrapInterval) -> str:
+def shown(interval: BootstrapInterval) -> str:
+    """The value with its interval, if it has one."""
     if interval.low is None or interval.high is None:
         return f"{interval.value:+.1f}"
     return f"{interval.value:+.1f} ({interval.low:+.1f} … {interval.high:+.1f})"
@@ -75,8 +76,8 @@ def main() -> None:
     print("|---|---:|---:|---:|")
     print(_row(whole, ""))
     for other, comparison in zip(others, found, strict=True):
-        print(_row(other, _shown(comparison.interval("driving_score"))))
-    print(f"\nInteraction: {_shown(interaction(*found[:3]))} DS over {len(found[2].pairs)} pairs.")
+        print(_row(other, shown(comparison.interval("driving_score"))))
+    print(f"\nInteraction: {shown(interaction(*found[:3]))} DS over {len(found[2].pairs)} pairs.")
 
 
 if __name__ == "__main__":
