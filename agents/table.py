@@ -178,7 +178,10 @@ AGENTS: dict[str, AgentEntry] = {
     ),
     "st-p3": _system("st-p3", "st_p3:StP3Agent", "what comes as occupancy, and the cheapest path"),
     "thinktwice": _system(
-        "thinktwice", "thinktwice:ThinkTwiceAgent", "a plan, mended by what comes if it is driven"
+        "thinktwice",
+        "thinktwice:ThinkTwiceAgent",
+        "a plan, mended by what comes if it is driven",
+        score="76.7",
     ),
     "driveadapter": _system(
         "driveadapter",

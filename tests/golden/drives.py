@@ -147,6 +147,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     ),
     "mile on town05_short": GoldenDrive(agent="mile", suite="town05_short", route="8", seconds=2.0),
     "vad on town05_short": GoldenDrive(agent="vad", suite="town05_short", route="8", seconds=2.0),
+    "thinktwice on town05_short": GoldenDrive(
+        agent="thinktwice", suite="town05_short", route="8", seconds=2.0
+    ),
     "ppo on town05_short": GoldenDrive(agent="ppo", suite="town05_short", route="8", seconds=3.0),
     "lbc-teacher on town05_short": GoldenDrive(
         agent="lbc-teacher", suite="town05_short", route="8", seconds=3.0
