@@ -16,12 +16,17 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from statistics import fmean
 
 from benchmarks.two_by_two import shown
-from leaderboard.records.record import RunRecord
+from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import ResultsError, read_run
 from leaderboard.studies.comparing import PairingError, compare_runs
 
+HEADER = (
+    "| system | beside | pairs | DS | DS there | difference |",
+    "|---|---|---:|---:|---:|---:|",
+)
 FLOORS = ("route-only", "ego-only")
 
 
@@ -55,8 +60,30 @@ def beside(runs: Sequence[RunRecord]) -> Iterator[tuple[RunRecord, RunRecord]]:
         yield from ((run, floor) for floor in floors if name not in FLOORS)
 
 
+def row(run: RunRecord, other: RunRecord) -> str:
+    """A system beside another, over the routes and seeds that both drove.
+
+    Raises:
+        PairingError: If there are none, or their worlds are not the same.
+    """
+    comparison = compare_runs(other, run)
+    cells = (
+        _name(run),
+        _name(other),
+        str(len(comparison.pairs)),
+        _mean([pair.after for pair in comparison.pairs]),
+        _mean([pair.before for pair in comparison.pairs]),
+        shown(comparison.interval("driving_score")),
+    )
+    return f"| {' | '.join(cells)} |"
+
+
 def _name(run: RunRecord) -> str:
     return f"`{'; '.join([run.agent, *run.interventions])}`"
+
+
+def _mean(records: Sequence[RouteRecord]) -> str:
+    return f"{fmean(record.score.driving_score for record in records):.1f}"
 
 
 def main() -> None:
@@ -67,27 +94,12 @@ def main() -> None:
     parser.add_argument("folders", nargs="+", type=Path, help="folders of runs")
     try:
         pairs = list(beside([read_run(folder) for folder in parser.parse_args().folders]))
-        found = [compare_runs(other, run) for run, other in pairs]
+        rows = [row(run, other) for run, other in pairs]
     except (ResultsError, PairingError, ValueError) as error:
         parser.error(str(error))
-    print("| system | beside | pairs | DS | DS there | difference |")
-    print("|---|---|---:|---:|---:|---:|")
-    for (run, other), comparison in zip(pairs, found, strict=True):
-        scores = [
-            sum(side.score.driving_score for side in sides) / len(comparison.pairs)
-            for sides in (
-                [pair.after for pair in comparison.pairs],
-                [pair.before for pair in comparison.pairs],
-            )
-        ]
-        cells = (
-            _name(run),
-            _name(other),
-            str(len(comparison.pairs)),
-            *(f"{score:.1f}" for score in scores),
-            shown(comparison.interval("driving_score")),
-        )
-        print(f"| {' | '.join(cells)} |")
+    if not rows:
+        parser.error("nothing to set beside: give runs with interventions or options too")
+    print(*HEADER, *rows, sep="\n")
 
 
 if __name__ == "__main__":

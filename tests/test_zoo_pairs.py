@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.zoo_pairs import beside
+from benchmarks.zoo_pairs import beside, row
+from leaderboard.scoring.score import Score
 from tests.leaderboard.made_records import route, run_of
 
 
@@ -37,6 +38,19 @@ def test_the_blind_ones_stand_beside_nobody_but_themselves_changed():
     assert names(driven("ego-only"), driven("ego-only", "drop:speed")) == [
         ("ego-only", "ego-only; drop:speed")
     ]
+
+
+def test_a_difference_is_the_systems_less_the_others_over_what_both_drove():
+    def scored(agent, *points):
+        records = [
+            route("1", seed=seed, score=Score(route_completion=each, infraction_score=1.0))
+            for seed, each in enumerate(points)
+        ]
+        return run_of(*records, agent=agent, seeds=tuple(range(len(points))))
+
+    cells = row(scored("lbc", 80.0, 0.0), scored("lbc?rules=off", 50.0)).strip("| ").split(" | ")
+    assert cells[:5] == ["`lbc`", "`lbc?rules=off`", "1", "80.0", "50.0"]
+    assert cells[5].startswith("+30.0")
 
 
 def test_names_that_begin_alike_are_not_one_system():
