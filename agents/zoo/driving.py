@@ -133,6 +133,8 @@ class SystemAgent:
             edited: Who makes the edits inside the network, for those who go on from there.
         """
         state = memory.states[_EVERY - 1] if len(memory.states) == _EVERY else None
+        if state is not None and not torch.is_inference_mode_enabled():
+            state = tuple(part.clone() for part in state)  # as gradients go through it
         with (edited or self._edited(memory)).of(self.network):
             output: Output = self.network(self.seen(observation, memory), state)
         return output

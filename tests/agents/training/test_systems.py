@@ -163,6 +163,18 @@ def test_it_drives_one_decision_and_says_why(untrained, observation):
     assert all((part >= 0.0).all() for part in look.maps.values())
 
 
+@pytest.mark.parametrize("untrained", NAMES, indirect=True)
+def test_it_says_why_of_a_decision_that_rests_on_what_it_remembers(untrained, observation):
+    agent = load_agent(f"zoo:{untrained[1]}")
+    memory = agent.start(None, seed=0)
+    for _ in range(5):  # 0.5 s: what it then remembers is of a moment before
+        _, memory = agent.act(observation, memory)
+    output = agent.decide(observation, memory)
+    look = look_at(agent, observation, memory)
+    assert torch.equal(torch.from_numpy(look.response.waypoints), output.waypoints[0].detach())
+    assert all((part >= 0.0).all() for part in look.maps.values())
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_system_without_weights_says_how_to_train_it(name):
     if AGENTS[name].score:
