@@ -13,17 +13,16 @@ from __future__ import annotations
 import hashlib
 import json
 import random
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.training.street_grids import TownStyle, street_tables
+from agents.training.street_grids import street_tables
+from agents.training.town_styles import MADE_TOWNS
 from di_envs.config import check_name
 from di_envs.files.caches import ASKED, cache_folders, writable_cache
 from di_envs.files.whole import whole_folder
@@ -47,117 +46,9 @@ WAYS_A_ROUTE = 60  # that are tried
 APART_M = 20.0  # of a route's start from those of the suites' routes, and of its end from theirs
 _ROUTE_FILE = "routes.xml"
 
-_STREET = {"lanes": 1, "speed_kmh": 40.0}
-_AVENUE = {"lanes": 2, "speed_kmh": 50.0}
-_PARKED = {"lanes": 2, "speed_kmh": 50.0, "parking_m": 3.0}
-_LANE = {"lanes": 1, "speed_kmh": 30.0, "parking_m": 2.0}
-_HIGHWAY = {"lanes": 3, "speed_kmh": 80.0, "median_m": 3.5, "shoulder_m": 3.5, "sidewalk_m": 0.0}
-_COUNTRY = {"lanes": 1, "speed_kmh": 70.0, "shoulder_m": 1.5, "sidewalk_m": 0.0}
-
-TRAINING_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
-    {
-        "small_grid": TownStyle(
-            columns=5,
-            rows=4,
-            block_m=(75.0, 110.0),
-            sections={"street": _STREET},
-            lines=("street",),
-            vehicles=60,
-        ),
-        "large_grid": TownStyle(
-            columns=5,
-            rows=5,
-            block_m=(90.0, 140.0),
-            sections={"avenue": _AVENUE, "parked": _PARKED},
-            lines=("avenue", "parked"),
-            lights=0.8,
-            vehicles=90,
-            walkers=60,
-        ),
-        "suburb": TownStyle(
-            columns=5,
-            rows=5,
-            block_m=(80.0, 150.0),
-            sections={"street": _STREET, "lane": _LANE},
-            lines=("street", "lane"),
-            missing=0.3,
-            lights=0.3,
-            bend_m=14.0,
-            shift_m=4.0,
-            vehicles=50,
-            walkers=60,
-        ),
-        "highways": TownStyle(
-            columns=4,
-            rows=3,
-            block_m=(180.0, 260.0),
-            sections={"highway": _HIGHWAY, "avenue": _AVENUE},
-            lines=("highway", "avenue"),
-            missing=0.25,
-            lights=0.8,
-            vehicles=90,
-            walkers=20,
-        ),
-        "rural": TownStyle(
-            columns=4,
-            rows=3,
-            block_m=(180.0, 280.0),
-            sections={"country": _COUNTRY, "street": _STREET},
-            lines=("country", "country", "street"),
-            missing=0.3,
-            lights=0.35,
-            bend_m=22.0,
-            shift_m=6.0,
-            vehicles=40,
-            walkers=10,
-        ),
-        "downtown": TownStyle(
-            columns=6,
-            rows=4,
-            block_m=(80.0, 125.0),
-            sections={"avenue": _AVENUE, "street": _STREET, "parked": _PARKED},
-            lines=("avenue", "street", "parked"),
-            missing=0.15,
-            lights=0.9,
-            vehicles=90,
-            walkers=80,
-        ),
-        "mixed": TownStyle(
-            columns=5,
-            rows=4,
-            block_m=(90.0, 200.0),
-            sections={"avenue": _AVENUE, "street": _STREET, "highway": _HIGHWAY},
-            lines=("avenue", "street", "highway"),
-            missing=0.25,
-            lights=0.5,
-            bend_m=16.0,
-            vehicles=80,
-        ),
-    }
-)
-
-# A town of which eyes learn what stands beside and under roads elsewhere: decks, rails, pillars
-_MADE_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
-    {
-        **TRAINING_TOWNS,
-        "viaducts": TownStyle(
-            columns=4,
-            rows=3,
-            block_m=(170.0, 240.0),
-            sections={"highway": _HIGHWAY, "avenue": _AVENUE, "parked": _PARKED},
-            lines=("highway", "avenue", "parked"),
-            lights=0.8,
-            bend_m=12.0,
-            raised=0.6,
-            vehicles=150,
-            walkers=60,
-        ),
-    }
-)
-
 # Towns that are shipped, and that policies may be trained in where somebody asks for it
 SHIPPED_TOWNS = ("town05",)
-KNOWN_TOWNS = (*_MADE_TOWNS, *SHIPPED_TOWNS)
+KNOWN_TOWNS = (*MADE_TOWNS, *SHIPPED_TOWNS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +116,7 @@ def town_files(name: str, block: int = 0) -> TownFiles:
 def _made_files(name: str, block: int) -> TownFiles:
     """Of a made-up town; its map is made if it is not there."""
     first = _place(f"{name}-{_recipe_hash(name)}", "scenarios.json")
-    style = _MADE_TOWNS[name]
+    style = MADE_TOWNS[name]
     files = TownFiles(
         name=name,
         folder=_place(f"{first.name}-{block}", _ROUTE_FILE) if block else first,
@@ -279,7 +170,7 @@ def _suites_in(name: str) -> list[Suite]:
 @cache
 def _ends_taken(name: str) -> NDArray[np.float64]:
     """(K, 2, 2) x, y of the start and the end of every suite's route there [m]."""
-    if name in _MADE_TOWNS:
+    if name in MADE_TOWNS:
         return np.zeros((0, 2, 2))
     specs = [spec for suite in _suites_in(name) for spec in suite.specs()]
     return np.array([spec.positions[[0, -1], :2] for spec in specs])
@@ -287,7 +178,7 @@ def _ends_taken(name: str) -> NDArray[np.float64]:
 
 def _map(name: str) -> str:
     """The OpenDRIVE text of the first drawn town whose corners fit between its junctions."""
-    for table in street_tables(name, _MADE_TOWNS[name]):
+    for table in street_tables(name, MADE_TOWNS[name]):
         try:
             return town_text(plan_of(table))
         except ValueError:
@@ -296,7 +187,7 @@ def _map(name: str) -> str:
 
 
 def _recipe_hash(name: str) -> str:
-    recipe = json.dumps([VERSION, name, repr(_MADE_TOWNS[name])])
+    recipe = json.dumps([VERSION, name, repr(MADE_TOWNS[name])])
     return hashlib.blake2b(recipe.encode(), digest_size=6).hexdigest()
 
 

@@ -14,7 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from agents.training.towns import TRAINING_TOWNS, training_plans, training_town
+from agents.training.town_styles import TRAINING_TOWNS
+from agents.training.towns import training_plans, training_town
 from di_envs.town.lanes import LaneKind, SignalKind
 
 PICTURE = Path(__file__).resolve().parents[1] / "images" / "training_towns.png"

@@ -87,7 +87,8 @@ class Collect:
         from agents.training.collect import CARD_FILE, compile_for_drives, data_card
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.hiding import Hiding
-        from agents.training.towns import KNOWN_TOWNS, TRAINING_TOWNS
+        from agents.training.town_styles import TRAINING_TOWNS
+        from agents.training.towns import KNOWN_TOWNS
         from di_envs.config import check_name
         from di_envs.files.json_values import indented
         from di_envs.files.whole import write_whole

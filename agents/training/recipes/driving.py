@@ -18,7 +18,8 @@ from agents.training.collect import (
 )
 from agents.training.hiding import EVERYTHING, Hiding
 from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
-from agents.training.towns import KNOWN_TOWNS, TRAINING_TOWNS
+from agents.training.town_styles import TRAINING_TOWNS
+from agents.training.towns import KNOWN_TOWNS
 from agents.training.trainees import driver_of
 from di_envs.files.json_values import indented
 from di_envs.files.names import check_name

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from di_envs.numerics.bundles import by_reference
-from di_envs.town.lanes import Crosswalks, LaneKind, Lanes, SignalKind, Signals
+from di_envs.town.lanes import Crosswalks, LaneKind, Lanes
 from di_envs.town.town import Town
+from di_envs.world.walkers.crosswalk_tables import approaches, lights_of, strips
 from di_envs.world.walkers.lane_clearance import clearances
 
 BODY_M = 0.25  # half a walker's width
@@ -31,8 +32,6 @@ ATTACH_M = 6.0  # from a crosswalk's end to its sidewalk
 MEET_M = 0.5  # ends that are the same place
 JOIN_M = 3.0  # ends that a straight line joins
 LEVEL_M = 3.0
-LOOK_BACK_M = 80.0  # up to which vehicles ahead of a crosswalk are looked at
-STOP_LINE_M = 25.0  # from a crosswalk, within which a stop line guards it
 
 Line = NDArray[np.float64]  # (N, 3) x, y, z
 
@@ -98,9 +97,9 @@ def build_walk_graph(town: Town) -> WalkGraph:
         **_edge_arrays(edges),
         **_next_edges([edge.line for edge in edges]),
         points=_points_of(edges),
-        strip=_strips(crosswalks),
-        **_lights(lanes, crosswalks, town.signals),
-        **_approaches(lanes, crosswalks),
+        strip=strips(crosswalks),
+        **lights_of(lanes, crosswalks, town.signals),
+        **approaches(lanes, crosswalks),
     )
 
 
@@ -313,78 +312,3 @@ def _points_of(edges: list[_Edge]) -> NDArray[np.float64]:
         yaw = np.arctan2(step[:, 1], step[:, 0])
         rows.append(np.column_stack((edge.line, np.append(yaw, yaw[-1]))))
     return np.concatenate(rows)
-
-
-def _strips(crosswalks: Crosswalks) -> NDArray[np.float64]:
-    along = crosswalks.end - crosswalks.start
-    return np.column_stack(
-        (
-            0.5 * (crosswalks.start + crosswalks.end),
-            np.arctan2(along[:, 1], along[:, 0]),
-            0.5 * np.hypot(along[:, 0], along[:, 1]),
-            0.5 * crosswalks.width_m,
-        )
-    )
-
-
-def _lights(lanes: Lanes, crosswalks: Crosswalks, signals: Signals) -> dict[str, Any]:
-    """The lights at the stop lines before which, or shortly after which, a crosswalk lies."""
-    starts, lights = [0], []
-    for crosswalk in range(crosswalks.width_m.size):
-        found = set()
-        for k in range(
-            crosswalks.crossed_start[crosswalk], crosswalks.crossed_start[crosswalk + 1]
-        ):
-            lane = int(crosswalks.crossed_lane[k])
-            guarded = []
-            if lanes.length_m[lane] - crosswalks.crossed_end_m[k] <= STOP_LINE_M:
-                guarded.append(lane)
-            if (
-                lanes.junction[lane] >= 0
-                and crosswalks.crossed_begin_m[k] <= 0.5 * lanes.length_m[lane]
-            ):
-                guarded += _linked(lanes.predecessor_start, lanes.predecessor, lane)
-            lines = [int(lanes.stop_line[lane]) for lane in guarded if lanes.stop_line[lane] >= 0]
-            heads = [int(signals.stop_signal[line]) for line in lines]
-            found |= {head for head in heads if signals.kind[head] == SignalKind.LIGHT}
-        lights += sorted(found)
-        starts.append(len(lights))
-    return {"light_start": np.array(starts, np.int32), "light": np.array(lights, np.int32)}
-
-
-def _linked(start: NDArray[np.int32], links: NDArray[np.int32], lane: int) -> list[int]:
-    return [int(other) for other in links[start[lane] : start[lane + 1]]]
-
-
-def _approaches(lanes: Lanes, crosswalks: Crosswalks) -> dict[str, Any]:
-    """For each lane the crosswalks ahead, found by walking back from them."""
-    rows: list[list[tuple[int, int, float, float]]] = [[] for _ in range(lanes.kind.size)]
-    for crosswalk in range(crosswalks.width_m.size):
-        for k in range(
-            crosswalks.crossed_start[crosswalk], crosswalks.crossed_start[crosswalk + 1]
-        ):
-            crossed = int(crosswalks.crossed_lane[k])
-            depth = float(crosswalks.crossed_end_m[k] - crosswalks.crossed_begin_m[k])
-            begin = {crossed: float(crosswalks.crossed_begin_m[k])}
-            front = [crossed]
-            while front:
-                lane = front.pop(0)
-                rows[lane].append((crosswalk, crossed, begin[lane], begin[lane] + depth))
-                for before in _linked(lanes.predecessor_start, lanes.predecessor, lane):
-                    if begin[lane] < LOOK_BACK_M and before not in begin:
-                        begin[before] = begin[lane] + float(lanes.length_m[before])
-                        front.append(before)
-    flat = [row for own in rows for row in own]
-    leading: list[list[int]] = [[] for _ in range(crosswalks.width_m.size)]
-    for lane, own in enumerate(rows):
-        for crosswalk in sorted({row[0] for row in own}):
-            leading[crosswalk].append(lane)
-    return {
-        "approach_start": np.cumsum([0, *(len(own) for own in rows)]).astype(np.int32),
-        "approach": np.array([row[0] for row in flat], np.int32),
-        "approach_lane": np.array([row[1] for row in flat], np.int32),
-        "approach_begin_m": np.array([row[2] for row in flat], np.float64),
-        "approach_end_m": np.array([row[3] for row in flat], np.float64),
-        "leading_start": np.cumsum([0, *(len(lanes) for lanes in leading)]).astype(np.int32),
-        "leading": np.array([lane for lanes in leading for lane in lanes], np.int32),
-    }

@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
+from agents.training.town_styles import TRAINING_TOWNS
 from agents.training.towns import (
     KNOWN_TOWNS,
     SHIPPED_TOWNS,
-    TRAINING_TOWNS,
     block_of,
     town_files,
     training_plan,
