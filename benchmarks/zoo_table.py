@@ -6,7 +6,9 @@
     python -m benchmarks.zoo_table t-short t-long ...
 
 Give the folders of all systems together. SR is the share of drives that were completed without an
-infraction. Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
+infraction. Samples seen are those with pictures, after a + those of a planner alone, of all stages
+of its recipe whose weights it begins with, a teacher's too. Parameters and milliseconds are of
+`benchmarks/zoo.py`, which measures them anew here.
 Spearman's correlation is of the mean DS with the paper's, over the systems that both have; its
 intervals say how far it could have come out otherwise with other routes (95 %, bootstrap over
 routes, all systems on the same ones) and with other systems (95 %, Fieller, Hartley, Pearson: Tests
@@ -23,8 +25,12 @@ from pathlib import Path
 
 import numpy as np
 
+from agents import load_agent
+from agents.driveinsight.agent import DriveInsightAgent
+from agents.driveinsight.model import Policy
 from agents.zoo.registry import system_names
-from benchmarks.zoo import cost_ms
+from benchmarks.samples_seen import samples_seen
+from benchmarks.zoo import decision_ms, parameters_of, system_cost
 from di_envs.rules import rules_named
 from leaderboard.records.record import RouteRecord, RunRecord
 from leaderboard.records.results import ResultsError, read_run
@@ -40,7 +46,7 @@ COLUMNS = ("DS", "RC", "IS", "SR", "a km")  # on either suite
 HEADER = (
     "system",
     *(f"{suite} {name}" for suite in ("Short", "Long") for name in COLUMNS),
-    *("parameters", "ms", "paper Short", "paper Long", "Town05 in its training"),
+    *("samples seen", "parameters", "ms", "paper Short", "paper Long", "Town05 in its training"),
 )
 
 
@@ -100,11 +106,18 @@ def _cells(run: RunRecord | None) -> list[str]:
     ]
 
 
-def _row(name: str, runs: Mapping[str, RunRecord], systems: Sequence[str]) -> str:
-    cost = ["-", "-"]
-    if name in systems:
-        size, milliseconds = cost_ms(name)
-        cost = [f"{size:,}", f"{milliseconds:.0f}"]
+def _cost(name: str) -> list[str]:
+    """Parameters, and milliseconds a decision, of a policy or system."""
+    if name in system_names():
+        size, spent_ms = system_cost(name)
+    elif isinstance(agent := load_agent(name), DriveInsightAgent):
+        size, spent_ms = parameters_of(Policy(agent.policy.config)), decision_ms(agent)
+    else:
+        return ["-", "-"]
+    return [f"{size:,}", f"{spent_ms:.0f}"]
+
+
+def _row(name: str, runs: Mapping[str, RunRecord]) -> str:
     paper = TABLE_1.get(name)
     theirs = ["-", "-", "-"]
     if paper is not None:
@@ -112,7 +125,8 @@ def _row(name: str, runs: Mapping[str, RunRecord], systems: Sequence[str]) -> st
         theirs = ["-" if pair is None else f"{pair[0]} / {pair[1]}" for pair in pairs]
         theirs.append(paper.town05)
     cells = [cell for suite in SUITES for cell in _cells(runs.get(suite))]
-    return f"| {' | '.join([f'`{name}`', *cells, *cost, *theirs])} |"
+    seen = samples_seen(name) or "-"
+    return f"| {' | '.join([f'`{name}`', *cells, str(seen), *_cost(name), *theirs])} |"
 
 
 def rank_line(suite: str, found: Mapping[str, Mapping[str, RunRecord]]) -> str:
@@ -184,11 +198,10 @@ def main() -> None:
         runs = found[name]
         return tuple(-driving_interval(runs[s]).mean if s in runs else 0.0 for s in SUITES[::-1])
 
-    systems = system_names()
     print(f"| {' | '.join(HEADER)} |")
     print(f"|---|{'---:|' * (len(HEADER) - 2)}---|")
     for name in sorted(found, key=rank):
-        print(_row(name, found[name], systems), flush=True)
+        print(_row(name, found[name]), flush=True)
     print(*("\n" + rank_line(suite, found) for suite in SUITES), sep="")
 
 

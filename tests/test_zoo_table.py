@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from benchmarks.samples_seen import samples_seen
 from benchmarks.zoo_table import TABLE_1, rank_line, success_rate
 from di_envs.world.kinds import EventKind
 from leaderboard.scoring.score import Score
@@ -86,3 +87,12 @@ def test_a_success_is_a_whole_route_without_a_scored_infraction():
     half = route("2", score=Score(route_completion=50.0, infraction_score=1.0))
     red = route("3", events=(event(EventKind.RED_LIGHT, other=3),))
     assert success_rate(run_of(route("1"), half, red, route("4"), seeds=(0,))) == 50.0
+
+
+def test_samples_seen_are_of_all_stages_whose_weights_it_begins_with():
+    pictures, planned = samples_seen("driveinsight")
+    assert pictures == (5_000 + 2_000) * 5 * 4, "two stages of eyes, sequences of four moments"
+    assert planned == (8_000 + 4 * 5_000 + 8_000) * 128, "fresh, four rounds of corrections, last"
+    assert samples_seen("mile") == (3_750 * 16, 0)
+    assert samples_seen("driveadapter") == (2 * 3_750 * 16, 0), "its teacher's, too"
+    assert samples_seen("ppo") is None, "it learns from reward"
