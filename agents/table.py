@@ -137,7 +137,7 @@ AGENTS: dict[str, AgentEntry] = {
         "roach-raster",
         "roach_raster:RoachAgent",
         "Roach: the true view from above, the teacher",
-        score="89.3",
+        score="88.8",
     ),
     "transfuser": _system(
         "transfuser",
