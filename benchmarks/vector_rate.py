@@ -7,17 +7,20 @@ what threads gain: `cores` says how many were at work, and rounds with fewer tha
 say little. `of one` is the median of the rounds' ratios to one environment in the same round.
 `CPU us` is processor time a step of one world, `alone` the part of it that one thread does while
 the others wait; `could be` is what these times allow, likewise by rounds: that of one environment
-by (alone + the rest / threads).
+by (alone + the rest / threads). The row `two processes` is of one environment in each of two
+processes that share nothing: no threads of one process can gain more on this machine.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import multiprocessing
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from typing import Any
 
 import gymnasium
@@ -32,6 +35,7 @@ from di_envs.vector_env import RouteVectorEnv
 
 GROUPS = {"prompt": ("prompt",), "camera, lidar, prompt": ("camera", "lidar", "prompt")}
 ONE = "one environment"
+APART = "two processes"
 ROUND_STEPS = {"prompt": 1536, "camera, lidar, prompt": 128}  # of all worlds together
 CONTROL = np.array([0.0, 0.0, 1.0], np.float32)  # stands, so that no world ends
 
@@ -75,6 +79,41 @@ class ClockedWorlds(RouteVectorEnv):
         return self._crew
 
 
+class Apart:
+    """One environment in each of two processes, stepped at the same time."""
+
+    def __init__(self, env_id: str, groups: str) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._ends = []
+        for _ in range(2):
+            ours, theirs = context.Pipe()
+            context.Process(target=_serve, args=(theirs, env_id, groups), daemon=True).start()
+            self._ends.append(ours)
+
+    def timed(self, times: int) -> Round:
+        """Steps each so often; the rate is of both together."""
+        for end in self._ends:
+            end.send(times)
+        found: list[Round] = [end.recv() for end in self._ends]
+        return Round(
+            steps_per_s=sum(own.steps_per_s for own in found),
+            cores=sum(own.cores for own in found),
+            cpu_us=statistics.fmean(own.cpu_us for own in found),
+            alone_us=0.0,
+        )
+
+    def close(self) -> None:
+        """Ends both."""
+        for end in self._ends:
+            end.send(0)
+
+
+def _serve(end: Connection, env_id: str, groups: str) -> None:
+    env = gymnasium.make(env_id, observations=GROUPS[groups]).unwrapped
+    while times := end.recv():
+        end.send(timed(env, CONTROL, times, 1))
+
+
 def timed(env: Any, action: Any, times: int, worlds: int) -> Round:
     """Steps some worlds so often, from the start of their episodes."""
     env.reset(seed=0)
@@ -99,6 +138,7 @@ def measure(groups: str, env_id: str, numbers: Sequence[int], rounds: int) -> Ta
     given = {**gymnasium.spec(env_id).kwargs, **options}
     made: dict[str, tuple[Any, Any, int, int]] = {}  # environment, action, worlds, threads
     made[ONE] = gymnasium.make(env_id, **options).unwrapped, CONTROL, 1, 1
+    made[APART] = Apart(env_id, groups), CONTROL, 1, 2
     for worlds, threads in itertools.product(numbers, (1, 2)):
         many = ClockedWorlds(worlds, threads=threads, **given)
         name = f"{worlds} worlds, {threads} thread{'s' if threads > 1 else ''}"
@@ -106,7 +146,11 @@ def measure(groups: str, env_id: str, numbers: Sequence[int], rounds: int) -> Ta
     results: dict[str, list[Round]] = {name: [] for name in made}
     for _ in range(rounds + 1):
         for name, (env, action, worlds, _) in made.items():
-            results[name].append(timed(env, action, ROUND_STEPS[groups] // worlds, worlds))
+            times = ROUND_STEPS[groups] // worlds
+            apart = isinstance(env, Apart)
+            results[name].append(env.timed(times) if apart else timed(env, action, times, worlds))
+    for env, *_ in made.values():
+        env.close()
     columns = ("", "steps/s", "best", "of one", "cores", "CPU us", "alone", "could be")
     table = Table(*columns, title=groups)
     alone = results[ONE][1:]  # the first round warms up
