@@ -143,7 +143,7 @@ AGENTS: dict[str, AgentEntry] = {
         "transfuser",
         "transfuser:TransfuserAgent",
         "images and LiDAR joined at several scales",
-        score="85.5",
+        score="85.9",
     ),
     "interfuser": _system(
         "interfuser",
