@@ -7,7 +7,7 @@
 
 Source: Hu et al., ST-P3: End-to-end Vision-based Autonomous Driving via Spatial-Temporal Feature
 Learning, ECCV 2022. What we changed: sizes; the future is rolled forward at half as many cells; its
-noise is drawn from what the present shows alone; a narrow camera ahead.
+noise is drawn from what the present shows alone; a narrow camera ahead; the GRU adds to the path.
 """
 
 from __future__ import annotations
@@ -113,6 +113,8 @@ class StP3(SystemModel):
         self.start = nn.Linear(CHANNELS, config.gru)
         self.cell = nn.GRUCell(6, config.gru)
         self.step = nn.Linear(config.gru, 2)
+        nn.init.zeros_(self.step.weight)  # it begins with the path as it is
+        nn.init.zeros_(self.step.bias)
 
     def forward(self, seen: Seen, state: State | None = None) -> Output:
         bev, ahead = self.eyes(seen)
@@ -138,12 +140,12 @@ class StP3(SystemModel):
         return Output(waypoints=waypoints, said=said, state=(bev, seen["odometry"]))
 
     def _refine(self, ahead: Tensor, path: Tensor, target: Tensor) -> Tensor:
-        """(B, T, 2) by a GRU that begins with what the front camera shows."""
-        latent, place, places = self.start(ahead), torch.zeros_like(target), list[Tensor]()
+        """(B, T, 2) by a GRU that begins with what the front camera shows, and adds to the path."""
+        latent, moved, places = self.start(ahead), torch.zeros_like(target), list[Tensor]()
         for point in path.unbind(dim=1):
-            latent = self.cell(torch.cat([place, point, target], dim=1) / METRES, latent)
-            place = place + STEP_M * self.step(latent)
-            places.append(place)
+            latent = self.cell(torch.cat([moved, point, target], dim=1) / METRES, latent)
+            moved = moved + STEP_M * self.step(latent)
+            places.append(point + moved)
         return torch.stack(places, dim=1)
 
     def loss(self, output: Output, labels: Labels) -> dict[str, Tensor]:
