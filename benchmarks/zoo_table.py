@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents import load_agent
+from agents import AGENTS, load_agent
 from agents.driveinsight.agent import DriveInsightAgent
 from agents.driveinsight.model import Policy
 from agents.zoo.registry import system_names
@@ -106,11 +106,14 @@ def _cells(run: RunRecord | None) -> list[str]:
     ]
 
 
-def _cost(name: str) -> list[str]:
-    """Parameters, and milliseconds a decision, of a policy or system."""
+def cost_of(name: str) -> list[str]:
+    """Parameters, and milliseconds a decision, of a shipped policy or system.
+
+    A record may name a file as its agent, which is nobody's leave to run it.
+    """
     if name in system_names():
         size, spent_ms = system_cost(name)
-    elif isinstance(agent := load_agent(name), DriveInsightAgent):
+    elif name in AGENTS and isinstance(agent := load_agent(name), DriveInsightAgent):
         size, spent_ms = parameters_of(Policy(agent.policy.config)), decision_ms(agent)
     else:
         return ["-", "-"]
@@ -126,7 +129,7 @@ def _row(name: str, runs: Mapping[str, RunRecord]) -> str:
         theirs.append(paper.town05)
     cells = [cell for suite in SUITES for cell in _cells(runs.get(suite))]
     seen = samples_seen(name) or "-"
-    return f"| {' | '.join([f'`{name}`', *cells, str(seen), *_cost(name), *theirs])} |"
+    return f"| {' | '.join([f'`{name}`', *cells, str(seen), *cost_of(name), *theirs])} |"
 
 
 def rank_line(suite: str, found: Mapping[str, Mapping[str, RunRecord]]) -> str:

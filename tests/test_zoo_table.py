@@ -8,7 +8,7 @@ import re
 import pytest
 
 from benchmarks.samples_seen import samples_seen
-from benchmarks.zoo_table import TABLE_1, rank_line, success_rate
+from benchmarks.zoo_table import TABLE_1, cost_of, rank_line, success_rate
 from di_envs.world.kinds import EventKind
 from leaderboard.scoring.score import Score
 from tests.leaderboard.made_records import event, route, run_of
@@ -96,3 +96,20 @@ def test_samples_seen_are_of_all_stages_whose_weights_it_begins_with():
     assert samples_seen("mile") == (3_750 * 16, 0)
     assert samples_seen("driveadapter") == (2 * 3_750 * 16, 0), "its teacher's, too"
     assert samples_seen("ppo") is None, "it learns from reward"
+
+
+def test_an_agent_that_a_record_names_by_its_file_is_not_run(tmp_path):
+    (tmp_path / "mine.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w')\n")
+    assert cost_of(f"{tmp_path / 'mine.py'}:Mine") == ["-", "-"]
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("name", ["route-only", "ego-only"])
+def test_policies_and_systems_have_a_cost(name):
+    size, spent_ms = cost_of(name)
+    assert 100_000 < int(size.replace(",", "")) < 2_000_000
+    assert spent_ms.isdigit(), "whole milliseconds, 0 for the smallest"
+
+
+def test_who_is_no_network_has_no_cost():
+    assert cost_of("constant") == ["-", "-"]
