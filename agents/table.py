@@ -118,6 +118,15 @@ AGENTS: dict[str, AgentEntry] = {
         data_files=POLICY_FILES,
         packages=("torch",),
     ),
+    "driveinsight-budget": AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary="as driveinsight, taught by the samples of the zoo's systems alone",
+        version=1,
+        options={"shipped": "driveinsight-budget"},
+        data="driveinsight/weights/driveinsight-budget",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    ),
     "route-only": AgentEntry(
         entry_point="agents.driveinsight.agent:DriveInsightAgent",
         summary="a policy that knows its way and speed alone (a control for whoever claims to see)",

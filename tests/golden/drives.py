@@ -130,6 +130,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     "driveinsight-town05 on town05_short": GoldenDrive(
         agent="driveinsight-town05", suite="town05_short", route="8", seconds=2.0
     ),
+    "driveinsight-budget on town05_short": GoldenDrive(
+        agent="driveinsight-budget", suite="town05_short", route="8", seconds=2.0
+    ),
     "route-only on town05_short": GoldenDrive(
         agent="route-only", suite="town05_short", route="8", seconds=3.0
     ),

@@ -14,9 +14,10 @@ from leaderboard.running.jobs import Job, RunSpec
 
 NAMES = [name for name, entry in AGENTS.items() if entry.data.startswith("driveinsight/weights/")]
 MOST_BYTES = 4_000_000
-TRAINED_AS = {"driveinsight-town05": "driveinsight"}  # of other drives
+# Of other drives, or of fewer samples
+TRAINED_AS = {"driveinsight-town05": "driveinsight", "driveinsight-budget": "driveinsight"}
 # Drives of networks that another drives already, with other weights
-AGAIN = ("driveinsight-sensors", "driveinsight-town05")
+AGAIN = ("driveinsight-sensors", "driveinsight-town05", "driveinsight-budget")
 DRIVEN = [pytest.param(name, marks=pytest.mark.full) if name in AGAIN else name for name in NAMES]
 
 
