@@ -25,7 +25,7 @@ from agents.faults import AgentDiedError, AgentFaultError
 from agents.processes import FRESH, births, how_it_ended, keep_others_out
 from agents.shared_arrays import Sender
 from di_envs.edits.text import EditError, EditText
-from di_envs.files.json_values import JsonError, parsed
+from di_envs.files.json_text import JsonError, parsed
 from di_envs.files.plain_text import one_plain_line
 from di_envs.sensors.carla_suite import SensorSuiteError
 from di_envs.town.plan import RoutePlan

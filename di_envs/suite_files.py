@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from di_envs.files.json_values import compact, to_json
+from di_envs.files.json_text import compact
+from di_envs.files.json_values import to_json
 from di_envs.suites import DATA, NO_SCENARIOS, Suite, choose_suite, shipped_or_own
 from di_envs.town.loading import FROM_MAP, NO_SIGNALS, SIDECARS, SYNTHESISE
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from di_envs.config import WEATHERS
-from di_envs.files.json_values import from_json, read_json
+from di_envs.files.json_text import read_json
+from di_envs.files.json_values import from_json
 from di_envs.files.names import check_name
 from di_envs.planned_routes import PlannedRoutes, plan_routes
 from di_envs.town.plan import RoutePlan

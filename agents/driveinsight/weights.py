@@ -15,7 +15,7 @@ from agents.networks.weights import (
     take_tensors,
     weights_digest,
 )
-from di_envs.files.json_values import JsonError
+from di_envs.files.json_text import JsonError
 
 
 def save_pretrained(policy: Policy, folder: Path, card: str) -> None:

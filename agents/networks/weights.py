@@ -17,7 +17,7 @@ from safetensors import SafetensorError
 from torch import Tensor, nn
 
 from agents.hub import with_metadata
-from di_envs.files.json_values import JsonError, indented, read_json
+from di_envs.files.json_text import JsonError, indented, read_json
 from di_envs.files.whole import write_whole
 
 CONFIG_FILE = "config.json"

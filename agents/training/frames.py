@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.files.json_values import JsonError, from_json, one_line, parsed, read_json
+from di_envs.files.json_text import JsonError, one_line, parsed, read_json
+from di_envs.files.json_values import from_json
 from di_envs.files.names import check_name
 from di_envs.files.received import check_array, read_arrays
 from di_envs.files.whole import write_whole

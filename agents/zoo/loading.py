@@ -10,7 +10,7 @@ from agents.hub import HubError, local_folder
 from agents.networks.weights import CONFIG_FILE, WeightsError, read_content
 from agents.zoo.registry import config_from
 from agents.zoo.system import System
-from di_envs.files.json_values import JsonError
+from di_envs.files.json_text import JsonError
 
 
 class FolderDriver:

@@ -11,7 +11,7 @@ import torch
 from agents import AGENTS, POLICY_FILES
 from agents.zoo.system import System, SystemConfig, SystemModel
 from di_envs.config import check_name
-from di_envs.files.json_values import JsonError
+from di_envs.files.json_text import JsonError
 
 _PLACE = "agents.zoo."
 

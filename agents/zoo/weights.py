@@ -15,7 +15,7 @@ from agents.networks.weights import (
 )
 from agents.zoo.registry import config_from, network_of
 from agents.zoo.system import System, SystemModel
-from di_envs.files.json_values import JsonError, read_json
+from di_envs.files.json_text import JsonError, read_json
 
 
 def save_system(network: SystemModel, folder: Path, card: str) -> None:

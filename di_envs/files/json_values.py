@@ -1,4 +1,4 @@
-"""JSON text to frozen dataclasses and back, by their annotations; all else is refused in a line.
+"""Values of JSON to frozen dataclasses and back, by annotations; all else is refused in a line.
 
 An error names the file, the field by its dotted path, what was expected and what came:
 
@@ -17,129 +17,19 @@ them), turns 1 into 1.0, and names neither the value that came nor the nearest k
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal, TypeVar, Union
 
+from di_envs.files.json_text import JsonError, names_in, shown
 from di_envs.files.names import name_hint
 from di_envs.files.plain_text import one_plain_line
-from di_envs.files.received import read_bytes
 
 T = TypeVar("T")
-
-LARGEST_INTEGER = 2**64  # whole numbers from here on are refused: no field of ours holds such
-DEEPEST = 64  # lists and objects within one another
-_LONGEST_SHOWN = 60  # characters of what came
-
-
-class JsonError(ValueError):
-    """Text that is not JSON, or values that are not what was expected, in one line."""
-
-
-class ForeignError(JsonError):
-    """Whole JSON, but of something else, or of another format version."""
-
-
-# Text to values
-
-
-def read_json(path: Path) -> Any:
-    """The values in a file.
-
-    Raises:
-        JsonError: If it cannot be read, or is not JSON as RFC 8259 has it.
-    """
-    try:
-        text = read_bytes(path).decode("utf-8")
-    except OSError as error:
-        raise JsonError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise JsonError(f"{path}: is not whole JSON: {error}") from error
-    return parsed(text, str(path))
-
-
-def parsed(text: str, source: str) -> Any:
-    """The values that a text holds: no NaN, nothing infinite, nothing absurdly long or deep.
-
-    Args:
-        text: Of JSON.
-        source: What errors call it, such as the file's path.
-
-    Raises:
-        JsonError: If it is not such text.
-    """
-    try:
-        value = json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_integer)
-    except (RecursionError, MemoryError):
-        raise JsonError(f"{source}: is nested deeper than {DEEPEST} lists and objects") from None
-    except ValueError as error:
-        raise JsonError(f"{source}: is not whole JSON: {error}") from error
-    if _depth(value) > DEEPEST:
-        raise JsonError(f"{source}: is nested deeper than {DEEPEST} lists and objects")
-    if "\\ud" in text.lower() and not _is_unicode(value):
-        raise JsonError(f"{source}: is not whole JSON: half of a surrogate pair is no character")
-    return value
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number of JSON")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if math.isinf(value):
-        raise ValueError(f"{_cut(text)} is too large a number")
-    return value
-
-
-def _integer(text: str) -> int:
-    if len(text) > 21 or abs(int(text)) >= LARGEST_INTEGER:
-        raise ValueError(f"{_cut(text)} is too large a whole number")
-    return int(text)
-
-
-def _is_unicode(value: Any) -> bool:
-    try:
-        json.dumps(value, ensure_ascii=False).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def _depth(value: Any) -> int:
-    """How many lists and objects stand within one another."""
-    depth, level = 0, [value]
-    while level := [item for item in level if isinstance(item, list | dict)]:
-        depth += 1
-        level = [i for item in level for i in (item.values() if type(item) is dict else item)]
-    return depth
-
-
-def read_document(path: Path, form: str, version: int) -> dict[str, Any]:
-    """What a file of ours holds beside `format` and `format_version`, which must be these.
-
-    Raises:
-        ForeignError: If it is of another format or version.
-        JsonError: If it cannot be read or is not JSON.
-    """
-    content = read_json(path)
-    if not isinstance(content, dict) or content.pop("format", None) != form:
-        raise ForeignError(f"{path}: is something else (its format is not '{form}')")
-    given = content.pop("format_version", None)
-    if given != version:
-        raise ForeignError(
-            f"{path}: has format version {_shown(given)}, this program reads {version}"
-        )
-    return content
-
-
-# Values to dataclasses
 
 
 def from_json(
@@ -233,10 +123,10 @@ class _Reader:
         fields = _fields(kind)
         for name in value:
             if name not in fields and not self.foreign:
-                raise _RefusedError(at, f"unknown field {_shown(name)}; {name_hint(name, fields)}")
+                raise _RefusedError(at, f"unknown field {shown(name)}; {name_hint(name, fields)}")
         for name, (_, optional) in fields.items():
             if name not in value and (self.complete or not optional):
-                raise _RefusedError(_below(at, name), f"is missing; there is {_names(value)}")
+                raise _RefusedError(_below(at, name), f"is missing; there is {names_in(value)}")
         given = {
             name: self.read(part, value[name], _below(at, name))
             for name, (part, _) in fields.items()
@@ -291,7 +181,7 @@ def _name_of(kind: Any) -> str:
 def _chosen(by_name: Mapping[str, T], value: Any, at: str) -> T:
     if isinstance(value, str) and value in by_name:
         return by_name[value]
-    raise _RefusedError(at, f"unknown {_shown(value)}; {name_hint(value, by_name)}")
+    raise _RefusedError(at, f"unknown {shown(value)}; {name_hint(value, by_name)}")
 
 
 @cache
@@ -313,29 +203,7 @@ def _below(at: str, name: str) -> str:
 
 
 def _refuse(at: str, expected: str, value: Any) -> typing.NoReturn:
-    raise _RefusedError(at, f"expected {expected}, got {_shown(value)}")
-
-
-def _shown(value: Any) -> str:
-    """What came, short and in one line, as JSON calls it."""
-    if value is None or isinstance(value, bool):
-        return json.dumps(value)
-    if isinstance(value, Mapping):
-        return f"an object with {_names(value)}"
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}" if value else "an empty list"
-    return _cut(repr(value))
-
-
-def _names(value: Mapping[str, Any]) -> str:
-    return _cut(", ".join(map(repr, list(value)[:5]))) or "nothing in it"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
-
-
-# Dataclasses to text
+    raise _RefusedError(at, f"expected {expected}, got {shown(value)}")
 
 
 def to_json(value: Any) -> Any:
@@ -347,24 +215,3 @@ def to_json(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: to_json(item) for name, item in value.items()}
     return [to_json(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def compact(value: Any) -> str:
-    """Plain values as text without spaces. ValueError if a number is not finite."""
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))
-
-
-def indented(value: Any) -> str:
-    """Plain values as a file's text, a line a value. ValueError if a number is not finite."""
-    return json.dumps(value, allow_nan=False, indent=1) + "\n"
-
-
-def by_lines(values: Mapping[str, str]) -> str:
-    """An object as a file's text: a line for each field, whose value is text of JSON already."""
-    lines = (f" {json.dumps(name)}: {text}" for name, text in values.items())
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def one_line(value: Any) -> str:
-    """Plain values as a file's text of one line. ValueError if a number is not finite."""
-    return json.dumps(value, allow_nan=False) + "\n"

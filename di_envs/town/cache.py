@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from di_envs.files.caches import cache_folders, warn_not_kept, writable_cache
-from di_envs.files.json_values import from_json, parsed
+from di_envs.files.json_text import parsed
+from di_envs.files.json_values import from_json
 from di_envs.files.received import arrays_digest, read_arrays
 from di_envs.files.whole import write_whole
 from di_envs.town.lanes import Crosswalks, Lanes, Signals

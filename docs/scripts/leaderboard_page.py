@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from di_envs.files.json_values import by_lines, compact, read_json
+from di_envs.files.json_text import by_lines, compact, read_json
 from di_envs.files.whole import write_whole
 from di_envs.rules import rules_named
 from di_envs.world.event_names import EVENT_KEYS

@@ -90,7 +90,7 @@ class Collect:
         from agents.training.town_styles import TRAINING_TOWNS
         from agents.training.towns import KNOWN_TOWNS
         from di_envs.config import check_name
-        from di_envs.files.json_values import indented
+        from di_envs.files.json_text import indented
         from di_envs.files.whole import write_whole
         from leaderboard.running.compiling import compile_progress
         from leaderboard.running.jobs import SetupError

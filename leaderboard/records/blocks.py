@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from di_envs.files.json_values import compact, from_json, parsed
+from di_envs.files.json_text import compact, parsed
+from di_envs.files.json_values import from_json
 from di_envs.files.planes import from_planes, from_text, to_planes, to_text
 
 _FOLDED, _PLANES = "<u4", 4  # of a difference, and its bytes

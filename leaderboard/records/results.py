@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from di_envs.files.json_values import (
+from di_envs.files.json_text import (
     ForeignError,
     JsonError,
     by_lines,

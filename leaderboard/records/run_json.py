@@ -8,7 +8,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from di_envs.files.json_values import JsonError, from_json, to_json
+from di_envs.files.json_text import JsonError
+from di_envs.files.json_values import from_json, to_json
 from di_envs.files.plain_text import one_plain_line
 from di_envs.rules import RULES
 from leaderboard.records.record import RouteRecord, RunRecord

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from di_envs.files.json_values import JsonError, read_json
+from di_envs.files.json_text import JsonError, read_json
 from leaderboard.records.carla.results import carla_results
 from leaderboard.records.record import RunRecord
 from leaderboard.records.results import CARLA_FILE, RECORD_FILE, route_files, run_folder

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.files.json_values import from_json, parsed
+from di_envs.files.json_text import parsed
+from di_envs.files.json_values import from_json
 from di_envs.files.plain_text import file_name
 from di_envs.files.received import check_array, read_arrays
 from di_envs.files.whole import write_whole

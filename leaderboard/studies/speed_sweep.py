@@ -20,7 +20,8 @@ from rich.console import Console
 
 from agents.one_thread import one_thread
 from agents.processes import in_order, processes
-from di_envs.files.json_values import JsonError, from_json, one_line, read_json
+from di_envs.files.json_text import JsonError, one_line, read_json
+from di_envs.files.json_values import from_json
 from di_envs.files.whole import write_whole
 from leaderboard.records.record import RouteRecord
 from leaderboard.records.results import read_run

@@ -8,15 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from di_envs.files.json_values import (
-    ForeignError,
-    JsonError,
-    by_lines,
-    compact,
-    from_json,
-    read_document,
-    to_json,
-)
+from di_envs.files.json_text import ForeignError, JsonError, by_lines, compact, read_document
+from di_envs.files.json_values import from_json, to_json
 from di_envs.files.plain_text import file_name, one_plain_line
 from di_envs.files.whole import write_whole
 from leaderboard.studies import StudyError

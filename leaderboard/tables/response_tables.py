@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.explain.situations import SAYS
-from di_envs.files.json_values import indented
+from di_envs.files.json_text import indented
 from di_envs.files.whole import write_whole
 from leaderboard.responding.by_situation import by_situation, moments_of
 from leaderboard.responding.claims import LEVEL, SLIGHT, Finding, examined

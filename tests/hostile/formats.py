@@ -29,7 +29,7 @@ from agents.training.learning import Training
 from agents.training.log import append_row, forget_rows_after, read_rows
 from di_envs.edits.text import EditError
 from di_envs.edits.world import read_world_edits
-from di_envs.files.json_values import JsonError
+from di_envs.files.json_text import JsonError
 from di_envs.town import cache
 from di_envs.town.loading import load_town
 from di_envs.town.reading.sidecar import read_sidecar

@@ -21,7 +21,7 @@ from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRu
 from agents.training.town_styles import TRAINING_TOWNS
 from agents.training.towns import KNOWN_TOWNS
 from agents.training.trainees import driver_of
-from di_envs.files.json_values import indented
+from di_envs.files.json_text import indented
 from di_envs.files.names import check_name
 from di_envs.files.whole import write_whole
 

@@ -13,7 +13,8 @@ from typing import Any
 
 from agents.training.recipes.recipe import RecipeError, Stage
 from di_envs.differences import differences
-from di_envs.files.json_values import JsonError, from_json, indented, read_document, to_json
+from di_envs.files.json_text import JsonError, indented, read_document
+from di_envs.files.json_values import from_json, to_json
 from di_envs.files.whole import write_whole
 from di_envs.world_version import WORLD_VERSION
 

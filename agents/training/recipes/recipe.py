@@ -41,7 +41,8 @@ from typing import Any
 
 from agents.training.recipes.kinds import StageKind
 from agents.training.recipes.table import STAGE_KINDS
-from di_envs.files.json_values import JsonError, from_json
+from di_envs.files.json_text import JsonError
+from di_envs.files.json_values import from_json
 from di_envs.files.names import check_name, name_hint
 
 if sys.version_info >= (3, 11):

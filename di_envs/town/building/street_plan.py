@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from di_envs.files.json_values import from_json, read_json
+from di_envs.files.json_text import read_json
+from di_envs.files.json_values import from_json
 from di_envs.files.text_enum import TextEnum
 from di_envs.town.building.alignment import Curve, rounded_polyline
 

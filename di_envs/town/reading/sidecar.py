@@ -28,7 +28,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from di_envs.files.json_values import from_json, read_json
+from di_envs.files.json_text import read_json
+from di_envs.files.json_values import from_json
 from di_envs.town.lanes import Lanes, SignalKind
 from di_envs.town.reading.arms import Arm, junction_arms, junction_centres, stem_of
 from di_envs.town.reading.signals import Head, heads_of_arms

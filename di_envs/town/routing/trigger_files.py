@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from di_envs.files.json_values import JsonError, from_json, indented, read_json
+from di_envs.files.json_text import JsonError, indented, read_json
+from di_envs.files.json_values import from_json
 from di_envs.files.whole import write_whole
 
 NUMBERS = range(1, 11)  # of the Leaderboard 1.0's scenarios

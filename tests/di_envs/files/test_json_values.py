@@ -12,20 +12,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from di_envs.files.json_values import (
+from di_envs.files.json_text import (
     DEEPEST,
     ForeignError,
     JsonError,
     by_lines,
     compact,
-    from_json,
     indented,
     one_line,
     parsed,
     read_document,
     read_json,
-    to_json,
 )
+from di_envs.files.json_values import from_json, to_json
 
 
 class Kind(IntEnum):

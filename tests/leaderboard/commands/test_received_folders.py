@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from di_envs.files.json_values import JsonError, from_json
+from di_envs.files.json_text import JsonError
+from di_envs.files.json_values import from_json
 from di_envs.files.plain_text import file_name, one_plain_line, plain
 from di_envs.files.shown_text import in_figure, in_markdown
 from di_envs.suites import load_suite
