@@ -18,8 +18,9 @@ import tyro
 
 from agents.driveinsight.config import config_named
 from agents.training.caching import cached
-from agents.training.collect import DriveJob, drive_job, drive_paths
+from agents.training.collect import DriveJob, drive_job
 from agents.training.config import PLANNING, TrainConfig
+from agents.training.data_card import drive_paths
 from agents.training.learning import Training
 from agents.training.loading import Samples, batches
 from agents.training.moments import Moments, load_moments

@@ -33,19 +33,16 @@ from agents.training.frames import (
     write_dropped,
 )
 from agents.training.hiding import EVERYTHING, Hiding, told_less
-from agents.training.towns import block_of, town_files, training_plan
+from agents.training.towns import block_of, town_files
 from agents.versions import agent_version
 from di_envs.differences import differences
 from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.route_env import RouteEnv
-from di_envs.town.plan import RoadOption
 from di_envs.world.event_names import EVENT_KEYS
 from di_envs.world.kinds import EventKind
 from di_envs.world.world import Event
 from di_envs.world_version import WORLD_VERSION
 
-CARD_FILE = "card.json"
-WEATHER_NOTE = "none: it is drawn from 14 presets whenever a moment is rendered"
 STANDING_MPS = 0.1
 EXPERT = "expert"
 LEAST_MOMENTS = 10  # of a drive that is worth keeping
@@ -312,46 +309,3 @@ def without_standing_tail(drive: RecordedDrive) -> RecordedDrive:
 def _scenarios(events: Sequence[Event]) -> dict[str, int]:
     types = Counter(str(int(e.value)) for e in events if e.kind == EventKind.SCENARIO)
     return dict(sorted(types.items()))
-
-
-def drive_paths(folder: Path) -> list[Path]:
-    """The files of all drives that were kept, in order of town and number."""
-    return sorted(folder.glob("*/[0-9]*.npz"))
-
-
-def data_card(folder: Path) -> Mapping[str, Any]:
-    """Counts of what a folder holds: by town, by command, by scenario, and what was dropped.
-
-    Raises:
-        DriveFileError: If a file there is not whole.
-    """
-    towns, commands, scenarios = Counter[str](), Counter[str](), Counter[str]()
-    drivers = Counter[str]()
-    for path in drive_paths(folder):
-        drive = read_drive(path)
-        towns[path.parent.name] += len(drive)
-        scenarios.update(drive.facts["scenarios"])
-        commands.update(_commands(drive))
-        drivers[drive.facts.get("driver", EXPERT)] += len(drive)
-    dropped = Counter[str]()
-    for path in sorted(folder.glob("*/*.dropped.json")):
-        dropped[read_dropped(path)["why"]] += 1
-    return {
-        "moments": sum(towns.values()),
-        "seconds_apart": FRAME_S,
-        "drives": len(drive_paths(folder)),
-        "by_driver": dict(drivers),
-        "by_town": dict(sorted(towns.items())),
-        "by_command": dict(commands.most_common()),
-        "by_scenario": dict(sorted(scenarios.items())),
-        "dropped": dict(dropped.most_common()),
-        "weather": WEATHER_NOTE,
-    }
-
-
-def _commands(drive: RecordedDrive) -> Counter[str]:
-    """How many moments were driven under each command."""
-    plan = training_plan(str(drive.facts["town"]), str(drive.facts["route_id"]))
-    targets = drive.whole["target_index"][:, 0]
-    options = plan.option[plan.targets[targets]]
-    return Counter(RoadOption(int(option)).name.lower() for option in options)

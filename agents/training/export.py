@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from agents.processes import in_order, processes
-from agents.training.collect import drive_paths
+from agents.training.data_card import drive_paths
 from agents.training.frames import (
     FRAME_S,
     DriveFileError,

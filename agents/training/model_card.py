@@ -64,7 +64,7 @@ def model_card(
         step: Steps done.
         log: Rows of the training's log.
         checks: Rows of its closed-loop checks.
-        about_data: The data card; see `collect.data_card`.
+        about_data: The data card; see `data_card.data_card`.
     """
     parts = [
         *about,

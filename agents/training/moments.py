@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.training.collect import drive_paths
 from agents.training.config import TrainingError
+from agents.training.data_card import drive_paths
 from agents.training.frames import FRAME_S, RecordedDrive, read_drive
 from di_envs.numerics.keyed_arrays import keyed_uniforms
 from di_envs.numerics.keyed_random import Stream, uniform

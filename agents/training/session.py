@@ -19,8 +19,8 @@ from agents.driveinsight.config import PolicyConfig
 from agents.networks.grid import WIDE_GRID, GridConfig
 from agents.networks.weights import weights_digest
 from agents.training.caching import MomentCache, cached
-from agents.training.collect import data_card
 from agents.training.config import TrainConfig, TrainingError
+from agents.training.data_card import data_card
 from agents.training.distributed import Team, joined_team
 from agents.training.emphasis import Emphasis
 from agents.training.learning import Training

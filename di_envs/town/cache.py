@@ -36,6 +36,7 @@ READER_MODULES = (
     "reading.crosswalks",
     "reading.elements",
     "reading.guessing",
+    "reading.lane_sections",
     "reading.links",
     "reading.map_signals",
     "reading.network",

@@ -84,7 +84,8 @@ class Collect:
             raise UsageError("--address is of a Ray cluster: add --engine ray")
         check_model(self.driver, trust=self.trust)
 
-        from agents.training.collect import CARD_FILE, compile_for_drives, data_card
+        from agents.training.collect import compile_for_drives
+        from agents.training.data_card import CARD_FILE, data_card
         from agents.training.frames import FRAME_S, DriveFileError
         from agents.training.hiding import Hiding
         from agents.training.town_styles import TRAINING_TOWNS

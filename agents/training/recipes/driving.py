@@ -8,14 +8,8 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Literal
 
-from agents.training.collect import (
-    CARD_FILE,
-    EXPERT,
-    collect,
-    compile_for_drives,
-    data_card,
-    share_of,
-)
+from agents.training.collect import EXPERT, collect, compile_for_drives, share_of
+from agents.training.data_card import CARD_FILE, data_card
 from agents.training.hiding import EVERYTHING, Hiding
 from agents.training.recipes.kinds import POLICY_FOLDER, Made, Progress, StageRun
 from agents.training.town_styles import TRAINING_TOWNS

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.training.collect import drive_paths
+from agents.training.data_card import drive_paths
 from di_envs.files.text_enum import TextEnum
 
 POLICY_FOLDER = "policy"  # of a stage that makes one

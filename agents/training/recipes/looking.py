@@ -6,7 +6,7 @@ import time
 from contextlib import closing
 from dataclasses import dataclass
 
-from agents.training.collect import drive_paths
+from agents.training.data_card import drive_paths
 from agents.training.own_eyes import look_at, look_job, look_jobs
 from agents.training.recipes.kinds import POLICY_FOLDER, SEEN_FOLDER, Made, Progress, StageRun
 

@@ -12,8 +12,14 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
+import numpy as np
+
+from di_envs.town.reading.records import Float64
+
 LONGEST_M = 1e5  # of a road, and the last station that anything on it may have
 _LARGEST = 1e12  # of a coefficient; what larger ones make is no road
+_FASTEST = 1000.0  # of a speed limit, in its unit
+_SPEED_UNITS_MPS = {None: 1.0, "m/s": 1.0, "mph": 0.44704, "km/h": 1.0 / 3.6}
 _LAST_LANE = 200  # greatest lane id to either side
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -168,3 +174,24 @@ def lane_number(element: Element, key: str, default: int | None = None) -> int:
     if value != round(value):
         raise refused(element, f"<{element.tag} {key}='{element.get(key)}'> is not an integer")
     return int(value)
+
+
+def cubics(elements: Iterable[Element], key: str = "s", base: float = 0.0) -> Float64:
+    """(N, 5) begin [m] and a, b, c, d of each element's cubic, by where it begins; one of zeros."""
+    rows = [
+        [base + station(e, key, 0.0), *(number(e, c, 0.0) for c in ("a", "b", "c", "d"))]
+        for e in elements
+    ]
+    table = np.array(rows or [[base, 0.0, 0.0, 0.0, 0.0]])
+    return table[np.argsort(table[:, 0], kind="stable")]
+
+
+def speed_limit(element: Element | None) -> float | None:
+    """A limit [m/s]; None where there is none, which some files write as 0."""
+    if element is None or element.get("max") in (None, "no limit", "undefined"):
+        return None
+    unit = element.get("unit")
+    if unit not in _SPEED_UNITS_MPS:
+        known = ", ".join(u for u in _SPEED_UNITS_MPS if u)
+        raise refused(element, f"speed unit '{unit}' is unknown; known: {known}")
+    return number(element, "max", least=0.0, most=_FASTEST) * _SPEED_UNITS_MPS[unit] or None

@@ -7,54 +7,39 @@ ignores them. What cannot be read rightly is refused by road and line of the fil
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from di_envs.town.lanes import LaneKind
-from di_envs.town.reading.borders import NOTHING, summed
 from di_envs.town.reading.elements import (
     LONGEST_M,
+    cubics,
     lane_number,
     line_of,
     named,
     number,
     parse_xml,
     refused,
+    speed_limit,
     station,
     unique,
 )
+from di_envs.town.reading.lane_sections import COVER_M, sections_of
 from di_envs.town.reading.records import (
     GEOMETRY_SHAPES,
     Connection,
     CrosswalkRecord,
     Float64,
     GeometryRecord,
-    LaneRecord,
     OpenDrive,
     RoadLink,
     RoadRecord,
-    SectionRecord,
     SignalRecord,
 )
 
 GEO_ORIGIN = (42.0, 2.0)  # CARLA's default where a map has no geoReference [deg]
-_LANE_KINDS = {
-    "driving": LaneKind.DRIVING,
-    "bidirectional": LaneKind.DRIVING,
-    "parking": LaneKind.PARKING,
-    "shoulder": LaneKind.SHOULDER,
-    "sidewalk": LaneKind.SIDEWALK,
-    "walking": LaneKind.SIDEWALK,
-    "biking": LaneKind.BIKING,
-}
-_SIDES = ("left", "center", "right")
-_FASTEST = 1000.0  # of a speed limit, in its unit
 _SHARPEST = 100.0  # 1/m: a bend of a centimetre's radius
-_COVER_M, _COVER_SHARE = 1.0, 0.01  # that a plan view may be shorter than its road by
-_BORDERS_CROSS_M = 0.01  # that a border may lie within the one before it by
-_SPEED_UNITS_MPS = {None: 1.0, "m/s": 1.0, "mph": 0.44704, "km/h": 1.0 / 3.6}
+_COVER_SHARE = 0.01  # of a road that its plan view may be shorter by, or COVER_M
 
 
 def read_opendrive(text: str, source: str) -> OpenDrive:
@@ -92,32 +77,14 @@ def _root(text: str, source: str) -> Element:
     return root
 
 
-def _cubics(elements: Iterable[Element], key: str = "s", base: float = 0.0) -> Float64:
-    rows = [
-        [base + station(e, key, 0.0), *(number(e, c, 0.0) for c in ("a", "b", "c", "d"))]
-        for e in elements
-    ]
-    table = np.array(rows or [[base, 0.0, 0.0, 0.0, 0.0]])
-    return table[np.argsort(table[:, 0], kind="stable")]
-
-
-def _speed(element: Element | None) -> float | None:
-    """A limit [m/s]; None where there is none, which some files write as 0."""
-    if element is None or element.get("max") in (None, "no limit", "undefined"):
-        return None
-    unit = element.get("unit")
-    if unit not in _SPEED_UNITS_MPS:
-        known = ", ".join(u for u in _SPEED_UNITS_MPS if u)
-        raise refused(element, f"speed unit '{unit}' is unknown; known: {known}")
-    return number(element, "max", least=0.0, most=_FASTEST) * _SPEED_UNITS_MPS[unit] or None
-
-
 def _road(element: Element) -> RoadRecord:
     road_id = named(element)
     try:
         length = number(element, "length", least=0.0, most=LONGEST_M)
         junction = element.get("junction", "-1")
-        speeds = ((station(e, "s", 0.0), _speed(e.find("speed"))) for e in element.iterfind("type"))
+        speeds = (
+            (station(e, "s", 0.0), speed_limit(e.find("speed"))) for e in element.iterfind("type")
+        )
         return RoadRecord(
             road_id=road_id,
             line=line_of(element),
@@ -128,11 +95,11 @@ def _road(element: Element) -> RoadRecord:
             successor=_link(element.find("link/successor")),
             speeds=tuple(sorted((s, v) for s, v in speeds if v is not None)),
             geometry=_geometry(element, length),
-            elevation=_cubics(element.iterfind("elevationProfile/elevation")),
-            superelevation=_cubics(element.iterfind("lateralProfile/superelevation")),
+            elevation=cubics(element.iterfind("elevationProfile/elevation")),
+            superelevation=cubics(element.iterfind("lateralProfile/superelevation")),
             crossfall=(_crossfall(element, "left"), _crossfall(element, "right")),
-            lane_offset=_cubics(element.iterfind("lanes/laneOffset")),
-            sections=_sections(element, length),
+            lane_offset=cubics(element.iterfind("lanes/laneOffset")),
+            sections=sections_of(element, length),
             signals=_signals(element),
             crosswalks=_crosswalks(element),
         )
@@ -143,7 +110,7 @@ def _road(element: Element) -> RoadRecord:
 def _crossfall(road: Element, side: str) -> Float64:
     """How a side of a road falls outwards [rad]; 1.4 and 1.5 have it."""
     falls = road.iterfind("lateralProfile/crossfall")
-    return _cubics(e for e in falls if e.get("side", "both") in (side, "both"))
+    return cubics(e for e in falls if e.get("side", "both") in (side, "both"))
 
 
 def _link(element: Element | None) -> RoadLink | None:
@@ -191,7 +158,7 @@ def _check_cover(road: Element, pieces: list[GeometryRecord], length: float) -> 
     Raises:
         ValueError: If it does by more than roundings do.
     """
-    slack = max(_COVER_M, _COVER_SHARE * length)
+    slack = max(COVER_M, _COVER_SHARE * length)
     covered = 0.0
     for begin, end in (*((p.begin, p.begin + p.length) for p in pieces), (length, length)):
         if begin > covered + slack:
@@ -220,89 +187,6 @@ def _shape_parameters(shape: Element) -> tuple[float, ...]:
 
 def _curvature(shape: Element, key: str) -> float:
     return number(shape, key, least=-_SHARPEST, most=_SHARPEST)
-
-
-def _sections(road: Element, length: float) -> tuple[SectionRecord, ...]:
-    elements = sorted(road.iterfind("lanes/laneSection"), key=lambda e: station(e, "s", 0.0))
-    if not elements:
-        raise refused(road, "it has no lane sections; a road needs one <laneSection> at least")
-    begins = [station(e, "s", 0.0) for e in elements]
-    if begins[-1] > length + _COVER_M:
-        raise refused(
-            elements[-1], f"<laneSection s='{begins[-1]:g}'> begins behind the road's {length:g} m"
-        )
-    ends = [*begins[1:], max(length, begins[-1])]
-    shifted = bool(_cubics(road.iterfind("lanes/laneOffset"))[:, 1:].any())
-    return tuple(
-        SectionRecord(begin=begin, end=end, lanes=_lanes(element, begin, shifted))
-        for element, begin, end in zip(elements, begins, ends, strict=True)
-    )
-
-
-def _lanes(section: Element, begin: float, shifted: bool) -> dict[int, LaneRecord]:
-    """The lanes of a section by id, from the left to the right of the file's sides."""
-    elements = unique(e for side in _SIDES for e in section.iterfind(f"{side}/lane"))
-    by_id = {lane_number(e, "id"): e for e in elements.values()}
-    if len(by_id) < len(elements):
-        raise refused(section, f"two of its lanes have one id: {', '.join(elements)}")
-    if shifted and any(_has_border(e) for e in by_id.values()):
-        raise refused(
-            section,
-            "its lanes have <border>s and its road a <laneOffset>: which of them moves a lane is "
-            "not defined; give <width>s",
-        )
-    widths = _widths(by_id, begin)
-    return {lane_id: _lane(e, lane_id, widths[lane_id], begin) for lane_id, e in by_id.items()}
-
-
-def _has_border(lane: Element) -> bool:
-    return lane.find("border") is not None and lane.find("width") is None
-
-
-def _widths(lanes: dict[int, Element], begin: float) -> dict[int, Float64]:
-    """Widths of a section's lanes, from the centre outwards: a border is told from the centre."""
-    widths = {}
-    edges = {1: NOTHING, -1: NOTHING}  # outwards of the reference line, of the lanes so far
-    for lane_id in sorted(lanes, key=abs):
-        element, side = lanes[lane_id], 1 if lane_id > 0 else -1
-        if lane_id and _has_border(element):
-            border = _cubics(element.iterfind("border"), "sOffset", begin)
-            border[:, 1:] *= side
-            widths[lane_id] = summed(border, edges[side], -1.0)
-            if widths[lane_id][:, 1].min() < -_BORDERS_CROSS_M:
-                raise refused(
-                    element,
-                    f"the <border> of lane {lane_id} lies on the inner side of the lane within it; "
-                    "borders are counted from the reference line, to the right negative",
-                )
-            edges[side] = border
-        else:
-            widths[lane_id] = _cubics(element.iterfind("width"), "sOffset", begin)
-            if lane_id:
-                edges[side] = summed(edges[side], widths[lane_id])
-    return widths
-
-
-def _lane(element: Element, lane_id: int, widths: Float64, base: float) -> LaneRecord:
-    speeds = ((base + station(e, "sOffset", 0.0), _speed(e)) for e in element.iterfind("speed"))
-    return LaneRecord(
-        lane_id=lane_id,
-        kind=_LANE_KINDS.get(element.get("type", ""), LaneKind.OTHER),
-        widths=widths,
-        predecessors=tuple(lane_number(e, "id") for e in element.iterfind("link/predecessor")),
-        successors=tuple(lane_number(e, "id") for e in element.iterfind("link/successor")),
-        marks=tuple(_mark(e, base) for e in element.iterfind("roadMark")),
-        speeds=tuple(sorted((s, v) for s, v in speeds if v is not None)),
-    )
-
-
-def _mark(element: Element, base: float) -> tuple[float, bool, bool]:
-    """Where a mark begins and which ways it may be crossed; broken lines where it does not say."""
-    allowed = element.get("laneChange")
-    if allowed is None:
-        allowed = "both" if element.get("type", "none") in ("broken", "broken broken") else "none"
-    up, down = allowed in ("both", "increase"), allowed in ("both", "decrease")
-    return base + number(element, "sOffset", 0.0), up, down
 
 
 def _signals(road: Element) -> tuple[SignalRecord, ...]:

@@ -31,12 +31,12 @@ from di_envs.town.routing.remarks import remarks_on, text_of
 from di_envs.town.routing.road_graph import STEP_M, Edge, RoadGraph, build_road_graph
 from di_envs.town.routing.snapping import Snap
 from di_envs.town.routing.traces import Trace, join_traces
+from di_envs.town.routing.turns import TurnMemory, turn_option
 from di_envs.town.town import Town
 
 LEAST_M = 1.0  # of a route
 MAX_SNAP_M = 60.0  # the official Town05 Short keypoints lie up to 58 m from a lane
 TARGET_SPACING_M = 50.0  # Leaderboard 1.0
-STRAIGHT_BELOW_RAD = math.radians(35.0)  # a smaller change of direction is no turn
 SKIP_AT_CHANGE = 5  # points by which a lane change moves ahead
 
 Array = TypeVar("Array", bound=NDArray[Any])
@@ -83,7 +83,7 @@ def plan_route(
         )
     places = _checked_keypoints(keypoints, route_id)
     snaps = _checked_snaps(graph, places, route_id, max_snap_m)
-    turns = _TurnMemory()
+    turns = TurnMemory()
     pieces: list[Trace] = []
     options: list[int] = []
     for leg in range(len(places) - 1):
@@ -132,14 +132,6 @@ def target_indices(
             since_m += float(step_m[i - 1])
         before = now
     return np.array(kept, np.int32)
-
-
-@dataclass(kw_only=True)
-class _TurnMemory:
-    """What the turn decision remembers from edge to edge, and from one leg to the next."""
-
-    last_option: RoadOption = RoadOption.VOID
-    junction_exit: int = -1  # node at which the junction now being crossed is left
 
 
 @dataclass(kw_only=True)
@@ -217,14 +209,14 @@ def _trace_path(
     start: Snap,
     end: Snap,
     goal: NDArray[np.float64],
-    turns: _TurnMemory,
+    turns: TurnMemory,
 ) -> _LaidLeg:
     """Lays the points of one leg along a path of nodes."""
     edges = [graph.edges[a][b] for a, b in pairwise(path)]
     leg = _LaidLeg()
     here = start.place
     for i, edge in enumerate(edges):
-        option = _turn_option(graph, edges, i, turns)
+        option = turn_option(graph, edges, i, turns)
         if edge.option in _LANE_CHANGES:
             leg.add(here, option)
             here = _beyond_change(graph, edge, here)
@@ -276,64 +268,6 @@ def _cut_at_goal(edge: Edge, along: Trace, end: Snap, goal: NDArray[np.float64])
 def _nearest(trace: Trace, here: Trace) -> int:
     """Index of the point of a trace nearest to a place, the first of equals."""
     return int(np.argmin(np.linalg.norm(trace.points[:, :3] - here.points[0, :3], axis=1)))
-
-
-def _turn_option(graph: RoadGraph, edges: Sequence[Edge], i: int, turns: _TurnMemory) -> RoadOption:
-    """The command on edge `i`: one for all lanes of a junction, decided where it is entered."""
-    edge = edges[i]
-    option = edge.option
-    if i > 0:
-        crossing = edge.in_junction and option == RoadOption.LANEFOLLOW
-        before = edges[i - 1]
-        if (
-            crossing
-            and turns.last_option != RoadOption.VOID
-            and turns.junction_exit > 0
-            and turns.junction_exit != before.source
-        ):
-            option = turns.last_option
-        else:
-            turns.junction_exit = -1
-            if crossing and before.option == RoadOption.LANEFOLLOW and not before.in_junction:
-                tail = _last_in_junction(edges, i)
-                turns.junction_exit = tail.target
-                option = _turn_of(graph, before, edge, tail)
-    turns.last_option = option
-    return option
-
-
-def _last_in_junction(edges: Sequence[Edge], i: int) -> Edge:
-    """The last of the junction edges that follow one another from edge `i` on."""
-    last = edges[i]
-    for edge in edges[i:]:
-        if edge.option != RoadOption.LANEFOLLOW or not edge.in_junction:
-            break
-        last = edge
-    return last
-
-
-def _turn_of(graph: RoadGraph, before: Edge, edge: Edge, tail: Edge) -> RoadOption:
-    """Left, right or straight, by direction and by the other ways out of the same node."""
-    ahead = before.exit_direction
-    others = [
-        _cross(ahead, other.chord)
-        for node, other in graph.edges[edge.source].items()
-        if other.option == RoadOption.LANEFOLLOW and node != edge.target
-    ] or [0.0]
-    to_right = _cross(ahead, tail.exit_direction)
-    cosine = ahead[0] * tail.exit_direction[0] + ahead[1] * tail.exit_direction[1]
-    if math.acos(min(1.0, max(-1.0, cosine))) < STRAIGHT_BELOW_RAD:
-        return RoadOption.STRAIGHT
-    if to_right < min(others):
-        return RoadOption.LEFT
-    if to_right > max(others):
-        return RoadOption.RIGHT
-    return RoadOption.LEFT if to_right < 0.0 else RoadOption.RIGHT
-
-
-def _cross(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Positive where `b` points to the right of `a` (y is south)."""
-    return a[0] * b[1] - a[1] * b[0]
 
 
 def _plan_of(

@@ -10,15 +10,8 @@ import pytest
 
 from agents import load_agent
 from agents.training import collect as module
-from agents.training.collect import (
-    DriveJob,
-    Outcome,
-    collect,
-    data_card,
-    drive_job,
-    drive_paths,
-    without_standing_tail,
-)
+from agents.training.collect import DriveJob, Outcome, collect, drive_job, without_standing_tail
+from agents.training.data_card import data_card, drive_paths
 from agents.training.frames import (
     DriveFileError,
     DriveLog,

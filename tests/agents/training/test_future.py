@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.training.collect import drive_paths
+from agents.training.data_card import drive_paths
 from agents.training.frames import DriveStage, read_drive
 from agents.training.future import later_places, later_rasters
 from agents.training.loading import town_of

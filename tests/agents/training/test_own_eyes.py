@@ -12,8 +12,8 @@ from agents.driveinsight.model import Inputs, Policy
 from agents.driveinsight.reading import read_seen
 from agents.driveinsight.weights import from_pretrained, save_pretrained
 from agents.training.caching import cached
-from agents.training.collect import drive_paths
 from agents.training.config import PLANNING, TrainConfig, TrainingError
+from agents.training.data_card import drive_paths
 from agents.training.frames import read_drive, write_drive
 from agents.training.loading import town_of
 from agents.training.moments import load_moments

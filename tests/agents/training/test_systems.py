@@ -11,8 +11,8 @@ from agents import AGENTS, AgentSpecError, load_agent
 from agents.driveinsight.weights import from_pretrained, weights_digest
 from agents.explain.look import look_at
 from agents.networks.weights import WeightsError
-from agents.training.collect import drive_paths
 from agents.training.config import TrainConfig
+from agents.training.data_card import drive_paths
 from agents.training.distributed import ALONE
 from agents.training.frames import read_drive
 from agents.training.learning import Training

@@ -18,8 +18,8 @@ from agents.driveinsight.weights import (
     take_weights,
     weights_digest,
 )
-from agents.training.collect import drive_paths
 from agents.training.config import HELD_OUT, TrainConfig, TrainingError
+from agents.training.data_card import drive_paths
 from agents.training.frames import DriveFileError, read_drive
 from agents.training.learning import Training
 from agents.training.loading import Samples, batches

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agents.training.collect import drive_paths
+from agents.training.data_card import drive_paths
 from agents.training.frames import read_drive
 from leaderboard.commands import recipe as module
 from leaderboard.commands.cli import main
