@@ -22,12 +22,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from torch import nn
 
 from agents import AGENTS, load_agent
+from agents.base import Agent
 from agents.driveinsight.agent import DriveInsightAgent
 from agents.driveinsight.model import Policy
+from agents.sb3.agent import Sb3Agent
 from agents.zoo.registry import system_names
 from benchmarks.samples_seen import samples_seen
 from benchmarks.zoo import decision_ms, parameters_of, system_cost
@@ -113,11 +117,18 @@ def cost_of(name: str) -> list[str]:
     """
     if name in system_names():
         size, spent_ms = system_cost(name)
-    elif name in AGENTS and isinstance(agent := load_agent(name), DriveInsightAgent):
-        size, spent_ms = parameters_of(Policy(agent.policy.config)), decision_ms(agent)
+    elif name in AGENTS and (network := _network_of(agent := load_agent(name))) is not None:
+        size, spent_ms = parameters_of(network), decision_ms(agent)
     else:
         return ["-", "-"]
     return [f"{size:,}", f"{spent_ms:.0f}"]
+
+
+def _network_of(agent: Agent[Any]) -> nn.Module | None:
+    """What it has learnt, whole: a policy that drives has its norms folded into convolutions."""
+    if isinstance(agent, DriveInsightAgent):
+        return Policy(agent.policy.config)
+    return agent.network if isinstance(agent, Sb3Agent) else None
 
 
 def _row(name: str, runs: Mapping[str, RunRecord]) -> str:

@@ -103,6 +103,11 @@ class Sb3Agent:
                 f"the speed: train it with the observation group 'prompt' or 'inertial'."
             )
 
+    @property
+    def network(self) -> Any:
+        """The model's policy, a `torch.nn.Module`."""
+        return self._model.policy
+
     def start(self, plan: RoutePlan, seed: int) -> Sb3Memory:
         """Nothing is remembered yet."""
         return Sb3Memory()
