@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 from rich.table import Table
 
@@ -45,11 +46,18 @@ def _facts_of(name: str) -> tuple[str, str, str]:
         from agents.zoo.registry import config_of, network_of, system_names
     except ImportError as error:
         return f"needs {error.name}", "", ""
-    if name not in system_names():
-        return _track(name), "", ""
-    config = config_of(name)
-    size = sum(parameter.numel() for parameter in network_of(config).parameters())
-    return str(config.requires.track), config.inputs, f"{size:,}"
+    if name in system_names():
+        config = config_of(name)
+        return str(config.requires.track), config.inputs, _size(network_of(config))
+    agent = _loaded(name)
+    if isinstance(agent, str):
+        return agent, "", ""
+    needs = agent.requires
+    return str(needs.track), ", ".join(needs.observations), _size(agent.network)
+
+
+def _size(network: Any) -> str:
+    return f"{sum(parameter.numel() for parameter in network.parameters()):,}"
 
 
 def scheme_table() -> Table:
@@ -64,17 +72,24 @@ def scheme_table() -> Table:
 
 
 def _track(name: str) -> str:
-    """The agent's track; an agent whose extra packages are missing says which."""
-    try:
-        agent = load_agent(name)
-    except ImportError as error:
-        return f"needs {error.name}"
-    except AgentSpecError:
-        return "needs weights"
+    """The agent's track, or what is missing."""
+    agent = _loaded(name)
+    if isinstance(agent, str):
+        return agent
     try:
         return str(agent.requires.track)
     finally:
         agent.close()
+
+
+def _loaded(name: str) -> Any:
+    """The agent; if its extra packages or weights are missing, which."""
+    try:
+        return load_agent(name)
+    except ImportError as error:
+        return f"needs {error.name}"
+    except AgentSpecError:
+        return "needs weights"
 
 
 def suite_table() -> Table:
