@@ -17,7 +17,8 @@ from safetensors import SafetensorError
 from torch import Tensor, nn
 
 from agents.hub import with_metadata
-from di_envs.files.json_text import JsonError, indented, read_json
+from di_envs.files.json_text import JsonError, indented, read_json, shown
+from di_envs.files.plain_text import one_plain_line
 from di_envs.files.whole import write_whole
 
 CONFIG_FILE = "config.json"
@@ -75,7 +76,7 @@ def read_content(folder: Path, version: int) -> dict[str, Any]:
     found = content.pop("format_version", None) if isinstance(content, dict) else None
     if found != version:
         raise WeightsError(
-            f"{path} is of format {found}, this program reads {version}: train again, or "
+            f"{path} is of format {shown(found)}, this program reads {version}: train again, or "
             f"install the release that wrote it"
         )
     return dict(content)
@@ -98,13 +99,14 @@ def load_strictly(network: nn.Module, folder: Path, name: str) -> None:
     try:
         weights = safetensors.torch.load_file(path)
     except (SafetensorError, OSError) as error:
-        raise WeightsError(f"{path} is not whole ({error}): fetch or train it again") from error
+        said = one_plain_line(str(error))
+        raise WeightsError(f"{path} is not whole ({said}): fetch or train it again") from error
     try:
         network.load_state_dict(weights, strict=True)
     except RuntimeError as error:
-        first = " ".join(str(error).split("\n")[1:2]).strip()
+        first = one_plain_line(" ".join(str(error).split("\n")[1:2]))
         raise WeightsError(
-            f"{path} does not fit {folder / CONFIG_FILE} ('{name}'): {first} Both must come "
+            f"{path} does not fit {folder / CONFIG_FILE} ({shown(name)}): {first} Both must come "
             f"from one save_pretrained."
         ) from error
     if not all(torch.isfinite(value).all() for value in network.state_dict().values()):

@@ -27,6 +27,10 @@ from agents.training.frames import (
 )
 from agents.training.learning import Training
 from agents.training.log import append_row, forget_rows_after, read_rows
+from agents.training.recipes.marker import Marker, read_marker, write_marker
+from agents.training.recipes.recipe import RecipeError, read_recipe
+from agents.zoo.registry import config_of, network_of
+from agents.zoo.weights import load_system, save_system
 from di_envs.edits.text import EditError
 from di_envs.edits.world import read_world_edits
 from di_envs.files.json_text import JsonError
@@ -69,6 +73,24 @@ _ROWS = tuple(row(name, drive("0"), drive("1")) for name in ("baseline", "null")
 _TRIGGER = PlacedScenario(3, 1.0, 2.0, 0.0, 0.5)
 
 
+RECIPE = """seed = 3
+
+[[stage]]
+name = "expert"
+kind = "collect"
+frames = 10
+
+[[stage]]
+rounds = 2
+
+[[stage.each]]
+name = "policy-{round}"
+kind = "plan"
+data = ["expert"]
+config = "tiny"
+"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Format:
     """One kind of file.
@@ -91,6 +113,12 @@ class Format:
 def _make_run(folder: Path) -> None:
     events = (event(EventKind.RED_LIGHT),)
     write_run(folder, run_of(route(events=events), route(route_id="8", index=1)))
+
+
+def _make_stage(folder: Path) -> None:
+    (folder / "recipe.toml").write_text(RECIPE)
+    stages = read_recipe(folder / "recipe.toml").stages
+    write_marker(folder, Marker.of(stages[1], 3, {"expert": "ab"}))
 
 
 def _make_drive(folder: Path) -> None:
@@ -209,6 +237,24 @@ FORMATS = {
         read=from_pretrained,
         refusals=(WeightsError,),
         text=False,
+    ),
+    "system of the zoo": Format(
+        file="config.json",
+        make=lambda folder: save_system(network_of(config_of("ego-only")), folder, "a card"),
+        read=load_system,
+        refusals=(WeightsError,),
+    ),
+    "recipe": Format(
+        file="recipe.toml",
+        make=lambda folder: (folder / "recipe.toml").write_text(RECIPE),
+        read=lambda folder: read_recipe(folder / "recipe.toml"),
+        refusals=(RecipeError,),
+    ),
+    "stage of a recipe": Format(
+        file="stage.json",
+        make=_make_stage,
+        read=read_marker,
+        refusals=(RecipeError,),
     ),
     "checkpoint": Format(
         file="checkpoint.pt",

@@ -6,6 +6,7 @@ its folder, runs code, or takes five seconds.
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -93,6 +94,15 @@ def test_values_that_no_field_expects_are_refused(arena, name, number):
         value = draws.choice(VALUES)
         path.write_text(json_with(text, draws.randrange(10**6), value))
         attack(form, folder)
+
+
+@pytest.mark.parametrize("name", [n for n in FILES if FORMATS[n].file.endswith(".json")])
+def test_a_version_of_two_lines_is_told_in_one(arena, name):
+    form, folder, path = arena(name)
+    content = json.loads(path.read_text())
+    if "format_version" in content:
+        path.write_text(json.dumps({**content, "format_version": "a\nb"}))
+        assert r"'a\nb'" in attack(form, folder)
 
 
 @pytest.mark.parametrize("text", TEXTS)

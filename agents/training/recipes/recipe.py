@@ -44,6 +44,8 @@ from agents.training.recipes.table import STAGE_KINDS
 from di_envs.files.json_text import JsonError
 from di_envs.files.json_values import from_json
 from di_envs.files.names import check_name, name_hint
+from di_envs.files.plain_text import one_plain_line
+from di_envs.files.received import read_bytes
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -180,11 +182,11 @@ def read_recipe(path: Path) -> Recipe:
         RecipeError: If it cannot be read; names the file, the stage and the field.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(read_bytes(path).decode("utf-8"))
     except OSError as error:
         raise RecipeError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RecipeError(f"{path}: is not TOML: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise RecipeError(f"{path}: is not TOML: {one_plain_line(str(error))}") from error
     try:
         file = from_json(_File, values, str(path))
         return Recipe(path=path, seed=file.seed, stages=_stages(file, str(path)))
