@@ -7,12 +7,14 @@ decks).
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from di_envs.numerics.arrays import Bool, Float32, Float64, UInt8, UInt32
 from di_envs.numerics.kernels import kernel
 from di_envs.sensors.scene.grain import colour_classes
+from di_envs.sensors.scene.patches import pave_patches
 from di_envs.sensors.scene.raster import (
     TEXEL_M,
     Raster,
@@ -72,12 +74,10 @@ def build_rasters(town: Town, base_z: float) -> tuple[Raster, Raster, UInt8]:
     """
     points = town.lanes.points
     high = points[:, 2] - base_z > ELEVATED_M
-    plane, classes = _paint(town, ~high, points, GRASS)
-    if high.any():
-        deck, _ = _paint(town, high, points[high], CONCRETE)
-    else:
-        deck, _ = _paint(town, high, points[:0], CONCRETE)
-    return plane, deck, classes
+    with ThreadPoolExecutor(1) as other:  # kernels hold no lock: two cores paint at a time
+        deck = other.submit(_paint, town, high, points[high], CONCRETE)
+        plane, classes = _paint(town, ~high, points, GRASS)
+    return plane, deck.result()[0], classes
 
 
 def _paint(town: Town, chosen: Bool, within: Float64, ground: int) -> tuple[Raster, UInt8]:
@@ -92,7 +92,7 @@ def _paint(town: Town, chosen: Bool, within: Float64, ground: int) -> tuple[Rast
     for kind, class_ in _CLASS_OF_LANE.items():
         _fill_lanes(lanes, int(kind), chosen, origin, class_, classes)
     if ground == GRASS:
-        _pave_islands(classes, int(ISLAND_M2 / TEXEL_M**2), GRASS, ASPHALT)
+        pave_patches(classes, int(ISLAND_M2 / TEXEL_M**2), GRASS, ASPHALT)
     level = np.zeros((rows, columns), np.uint32)
     colour_classes(classes, _COLOURS, _GRAIN, _TAGS, _HOLDS_WATER, level)
     _draw_lines(lanes, chosen, origin, np.array([WHITE, YELLOW], np.float32), level)
@@ -164,36 +164,6 @@ def _fill_lanes(
             half_width = 0.5 * max(lanes.width_m[p], lanes.width_m[p + 1]) + 0.02
             piece = Rectangle(0.5 * (ax + bx), 0.5 * (ay + by), yaw, half_length, half_width)
             fill_rectangle(piece, origin, class_, classes)
-
-
-@kernel
-def _pave_islands(classes: UInt8, limit: int, ground: int, paving: int) -> None:
-    """Paves patches of ground of at most `limit` texels, as between the lanes of a junction."""
-    rows, columns = classes.shape
-    seen = np.zeros((rows, columns), np.bool_)
-    queue = np.zeros(rows * columns, np.int32)
-    for start in range(rows * columns):
-        if seen[start // columns, start % columns]:
-            continue
-        if classes[start // columns, start % columns] != ground:
-            continue
-        queue[0] = start
-        seen[start // columns, start % columns] = True
-        head, tail = 0, 1
-        while head < tail:
-            row, column = queue[head] // columns, queue[head] % columns
-            head += 1
-            for side in range(4):
-                i = row + (1 if side == 0 else (-1 if side == 1 else 0))
-                j = column + (1 if side == 2 else (-1 if side == 3 else 0))
-                inside = 0 <= i < rows and 0 <= j < columns
-                if inside and not seen[i, j] and classes[i, j] == ground:
-                    seen[i, j] = True
-                    queue[tail] = i * columns + j
-                    tail += 1
-        if tail <= limit:
-            for k in range(tail):
-                classes[queue[k] // columns, queue[k] % columns] = paving
 
 
 @kernel
