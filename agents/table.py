@@ -185,7 +185,12 @@ AGENTS: dict[str, AgentEntry] = {
     "mile": _system(
         "mile", "mile:MileAgent", "a model of the world, which can imagine too", score="75.0"
     ),
-    "st-p3": _system("st-p3", "st_p3:StP3Agent", "what comes as occupancy, and the cheapest path"),
+    "st-p3": _system(
+        "st-p3",
+        "st_p3:StP3Agent",
+        "what comes as occupancy, and the cheapest path",
+        score="74.2",
+    ),
     "thinktwice": _system(
         "thinktwice",
         "thinktwice:ThinkTwiceAgent",

@@ -150,6 +150,9 @@ GOLDEN: dict[str, GoldenDrive] = {
     ),
     "mile on town05_short": GoldenDrive(agent="mile", suite="town05_short", route="8", seconds=2.0),
     "vad on town05_short": GoldenDrive(agent="vad", suite="town05_short", route="8", seconds=2.0),
+    "st-p3 on town05_short": GoldenDrive(
+        agent="st-p3", suite="town05_short", route="8", seconds=2.0
+    ),
     "thinktwice on town05_short": GoldenDrive(
         agent="thinktwice", suite="town05_short", route="8", seconds=2.0
     ),
