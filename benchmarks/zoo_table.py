@@ -5,10 +5,10 @@
     ...
     python -m benchmarks.zoo_table t-short t-long ...
 
-Give the folders of all systems together. SR is the share of drives that were completed without an
-infraction. Samples seen are those with pictures, after a + those of a planner alone, of all stages
-of its recipe whose weights it begins with, a teacher's too. Parameters and milliseconds are of
-`benchmarks/zoo.py`, which measures them anew here.
+Give the folders of all systems together; `--brief` prints what the README has. SR is the share of
+drives that were completed without an infraction. Samples seen are those with pictures, after a +
+those of a planner alone, of all stages of its recipe whose weights it begins with, a teacher's too.
+Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
 Spearman's correlation is of the mean DS with the paper's, over the systems that both have; its
 intervals say how far it could have come out otherwise with other routes (95 %, bootstrap over
 routes, all systems on the same ones) and with other systems (95 %, Fieller, Hartley, Pearson: Tests
@@ -51,6 +51,12 @@ HEADER = (
     "system",
     *(f"{suite} {name}" for suite in ("Short", "Long") for name in COLUMNS),
     *("samples seen", "parameters", "ms", "paper Short", "paper Long", "Town05 in its training"),
+)
+
+
+BRIEF = (  # columns of the README's table
+    *("system", "Short DS", "Short RC", "Long DS", "Long RC", "parameters", "ms"),
+    *("paper Short", "paper Long"),
 )
 
 
@@ -131,7 +137,8 @@ def _network_of(agent: Agent[Any]) -> nn.Module | None:
     return agent.network if isinstance(agent, Sb3Agent) else None
 
 
-def _row(name: str, runs: Mapping[str, RunRecord]) -> str:
+def _row(name: str, runs: Mapping[str, RunRecord]) -> dict[str, str]:
+    """The cells of a row, by the names of their columns."""
     paper = TABLE_1.get(name)
     theirs = ["-", "-", "-"]
     if paper is not None:
@@ -140,7 +147,13 @@ def _row(name: str, runs: Mapping[str, RunRecord]) -> str:
         theirs.append(paper.town05)
     cells = [cell for suite in SUITES for cell in _cells(runs.get(suite))]
     seen = samples_seen(name) or "-"
-    return f"| {' | '.join([f'`{name}`', *cells, str(seen), *cost_of(name), *theirs])} |"
+    whole = [f"`{name}`", *cells, str(seen), *cost_of(name), *theirs]
+    return dict(zip(HEADER, whole, strict=True))
+
+
+def line_of(cells: Mapping[str, str], columns: Sequence[str]) -> str:
+    """A row of the table, of these columns."""
+    return f"| {' | '.join(cells[column] for column in columns)} |"
 
 
 def rank_line(suite: str, found: Mapping[str, Mapping[str, RunRecord]]) -> str:
@@ -197,9 +210,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folders", nargs="+", type=Path, help="folders of finished runs")
+    parser.add_argument("--brief", action="store_true", help="the README's columns alone")
+    options = parser.parse_args()
+    columns = BRIEF if options.brief else HEADER
     found: dict[str, dict[str, RunRecord]] = {}
     try:
-        for run in map(read_run, parser.parse_args().folders):
+        for run in map(read_run, options.folders):
             if run.suite not in SUITES:
                 parser.error(f"a run on {run.suite}: expected {' or '.join(SUITES)}")
             if run.suite in found.setdefault(run.agent, {}):
@@ -212,10 +228,10 @@ def main() -> None:
         runs = found[name]
         return tuple(-driving_interval(runs[s]).mean if s in runs else 0.0 for s in SUITES[::-1])
 
-    print(f"| {' | '.join(HEADER)} |")
-    print(f"|---|{'---:|' * (len(HEADER) - 2)}---|")
+    print(line_of(dict(zip(HEADER, HEADER, strict=True)), columns))
+    print(f"|---|{'---:|' * (len(columns) - 1)}")
     for name in sorted(found, key=rank):
-        print(_row(name, found[name]), flush=True)
+        print(line_of(_row(name, found[name]), columns), flush=True)
     print(*("\n" + rank_line(suite, found) for suite in SUITES), sep="")
 
 

@@ -8,8 +8,9 @@ import re
 import pytest
 
 from benchmarks.samples_seen import samples_seen
-from benchmarks.zoo_table import TABLE_1, cost_of, rank_line, success_rate
+from benchmarks.zoo_table import BRIEF, HEADER, TABLE_1, cost_of, main, rank_line, success_rate
 from di_envs.world.kinds import EventKind
+from leaderboard.records.results import write_run
 from leaderboard.scoring.score import Score
 from tests.leaderboard.made_records import event, route, run_of
 
@@ -109,6 +110,17 @@ def test_policies_systems_and_what_stable_baselines_learned_have_a_cost(name):
     size, spent_ms = cost_of(name)
     assert 50_000 < int(size.replace(",", "")) < 2_000_000
     assert spent_ms.isdigit(), "whole milliseconds, 0 for the smallest"
+
+
+def test_the_readmes_table_is_of_columns_of_the_large_one(tmp_path, capsys, monkeypatch):
+    write_run(tmp_path, driven("constant", [50.0]))
+    monkeypatch.setattr("sys.argv", ["zoo_table", "--brief", str(tmp_path)])
+    main()
+    head, _, row, *_ = capsys.readouterr().out.splitlines()
+    cells = dict(zip(head.split(" | "), row.split(" | "), strict=True))
+    assert set(BRIEF) <= set(HEADER)
+    assert cells["Long DS"] == "50.0"
+    assert cells["Short DS"] == "-"
 
 
 def test_who_is_no_network_has_no_cost():
