@@ -29,6 +29,19 @@ class AgentEntry:
 POLICY_FILES = ("config.json", "weights.safetensors")  # that decide what a policy does
 
 
+def _policy(name: str, summary: str, *, version: int) -> AgentEntry:
+    """A shipped policy of the paper's network: its name, what it is given or was taught."""
+    return AgentEntry(
+        entry_point="agents.driveinsight.agent:DriveInsightAgent",
+        summary=summary,
+        version=version,
+        options={"shipped": name},
+        data=f"driveinsight/weights/{name}",
+        data_files=POLICY_FILES,
+        packages=("torch",),
+    )
+
+
 def _system(
     name: str, agent: str, summary: str, *, score: str = "", version: int = 1
 ) -> AgentEntry:
@@ -82,59 +95,35 @@ AGENTS: dict[str, AgentEntry] = {
         version=1,
         packages=("highway-env",),
     ),
-    "driveinsight": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="the paper's policy: cameras, LiDAR and prompt to waypoints",
+    "driveinsight": _policy(
+        "driveinsight",
+        "the paper's policy: cameras, LiDAR and prompt to waypoints",
         version=3,
-        options={"shipped": "driveinsight"},
-        data="driveinsight/weights/driveinsight",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
-    "driveinsight-told": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="a policy that is told all of the prompt and sees nothing: the bound of planning",
+    "driveinsight-told": _policy(
+        "driveinsight-told",
+        "a policy that is told all of the prompt and sees nothing: the bound of planning",
         version=1,
-        options={"shipped": "driveinsight-told"},
-        data="driveinsight/weights/driveinsight-told",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
-    "driveinsight-sensors": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="a policy that sees by cameras and LiDAR, and is told its way and speed alone",
+    "driveinsight-sensors": _policy(
+        "driveinsight-sensors",
+        "a policy that sees by cameras and LiDAR, and is told its way and speed alone",
         version=1,
-        options={"shipped": "driveinsight-sensors"},
-        data="driveinsight/weights/driveinsight-sensors",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
-    "driveinsight-town05": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="as driveinsight, with drives of Town05 in training, as the paper's main row",
+    "driveinsight-town05": _policy(
+        "driveinsight-town05",
+        "as driveinsight, with drives of Town05 in training, as the paper's main row",
         version=2,
-        options={"shipped": "driveinsight-town05"},
-        data="driveinsight/weights/driveinsight-town05",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
-    "driveinsight-budget": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="as driveinsight, taught by the samples of the zoo's systems alone",
+    "driveinsight-budget": _policy(
+        "driveinsight-budget",
+        "as driveinsight, taught by the samples of the zoo's systems alone",
         version=1,
-        options={"shipped": "driveinsight-budget"},
-        data="driveinsight/weights/driveinsight-budget",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
-    "route-only": AgentEntry(
-        entry_point="agents.driveinsight.agent:DriveInsightAgent",
-        summary="a policy that knows its way and speed alone (a control for whoever claims to see)",
+    "route-only": _policy(
+        "route-only",
+        "a policy that knows its way and speed alone (a control for whoever claims to see)",
         version=1,
-        options={"shipped": "route-only"},
-        data="driveinsight/weights/route-only",
-        data_files=POLICY_FILES,
-        packages=("torch",),
     ),
     "ego-only": _system(
         "ego-only",
