@@ -36,7 +36,7 @@ site *options:
 # Draws the pictures of docs/ that need no recorded run
 pictures:
     {{python}} docs/scripts/floors.py
-    {{python}} docs/scripts/pictures.py
+    {{python}} -m docs.scripts.pictures
     {{python}} docs/scripts/sensor_pictures.py
     {{python}} docs/scripts/training_pictures.py
     {{python}} -m docs.scripts.page_pictures

@@ -24,7 +24,7 @@ from agents.shared_arrays import Receiver
 from agents.versions import loaded_packages
 from di_envs.edits.text import EditError, read_edit
 from di_envs.files.plain_text import one_plain_line
-from di_envs.sensors.carla_suite import SensorSuiteError
+from di_envs.sensors.carla_sensor import SensorSuiteError
 
 # How a fault is called in an answer
 CRASHED, REFUSED, NO_EDIT, BAD_SENSORS = "crashed", "refused", "edit", "sensors"

@@ -27,7 +27,7 @@ from agents.shared_arrays import Sender
 from di_envs.edits.text import EditError, EditText
 from di_envs.files.json_text import JsonError, parsed
 from di_envs.files.plain_text import one_plain_line
-from di_envs.sensors.carla_suite import SensorSuiteError
+from di_envs.sensors.carla_sensor import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 
 _LOOK_S = 0.25  # how often it is looked whether the process is still there

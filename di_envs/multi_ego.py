@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -25,13 +25,12 @@ from di_envs.config import check_name
 from di_envs.copying import Copyable
 from di_envs.course import load_course
 from di_envs.drawing.screen import Screen, check_render_mode, render_modes
-from di_envs.numerics.keyed_random import Stream, keyed_hash
 from di_envs.reward import standing_of
+from di_envs.routes_apart import RoutesApart
 from di_envs.town.plan import RoutePlan
 from di_envs.world.state import ActorKind
 from di_envs.world.world import Snapshot, World, WorldView
 
-START_APART_M = 12.0  # between two egos' starts: a vehicle's length and room to see it
 _SEEDS = 2**32  # of episodes that are reset without a seed
 
 Observation = dict[str, Any]
@@ -99,6 +98,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         self._screen = None if render_mode is None else Screen(course, render_mode)
         self.world = World(course.town, course.world_config)
         self.possible_agents = [f"ego_{ego}" for ego in range(egos)]
+        self._routes = RoutesApart(self._course, egos)
         self._egos = {name: ego for ego, name in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         space = course.form.space
@@ -139,7 +139,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         Args:
             seed: Of the world and of the choice of routes; None continues the sequence that the
                 last seed began.
-            options: `routes`: a route's id or index for each ego, starts at least `START_APART_M`
+            options: `routes`: a route's id or index for each ego, starts at least 12 m
                 apart; without it the seed draws them so. Other options pass unread, as PettingZoo's
                 conformance test asks.
 
@@ -150,7 +150,7 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
             self._np_random, _ = seeding.np_random(seed)
         world_seed = int(self._np_random.integers(_SEEDS)) if seed is None else int(seed)
         routes = (options or {}).get("routes")
-        chosen = self._drawn(world_seed) if routes is None else self._given(routes)
+        chosen = self._routes.drawn(world_seed) if routes is None else self._routes.given(routes)
         self.world.reset(world_seed, [self.plans[index] for index in chosen])
         self._start()
         view, infos = self.view, {}
@@ -283,48 +283,6 @@ class MultiEgoEnv(Copyable, ParallelEnv[str, Observation, Any]):
         for name, ego in self._driving().items():
             controls[ego] = checked_action(actions[name])
         return controls
-
-    def _drawn(self, seed: int) -> list[int]:
-        """A route for each ego, drawn on its own key; the next one where a start is taken."""
-        chosen: list[int] = []
-        count = len(self.plans)
-        for ego in range(len(self.possible_agents)):
-            draw = int(keyed_hash(seed, int(Stream.ROUTE), 0, ego)) % count
-            order = [(draw + further) % count for further in range(count)]
-            free = [index for index in order if self._too_near(index, chosen) is None]
-            if not free:
-                raise ValueError(
-                    f"Only {ego} of the {count} routes start {START_APART_M:g} m apart, and there "
-                    f"are {len(self.possible_agents)} egos. Take fewer, or a suite of more routes."
-                )
-            chosen.append(free[0])
-        return chosen
-
-    def _given(self, routes: Sequence[Any]) -> list[int]:
-        """The routes that the caller names, one an ego."""
-        egos = len(self.possible_agents)
-        if isinstance(routes, str) or len(routes) != egos:
-            raise ValueError(f"options['routes'] names {egos} routes, one an ego; got {routes!r}.")
-        chosen: list[int] = []
-        for route in routes:
-            index = self._course.route_index(route)
-            other = self._too_near(index, chosen)
-            if other is not None:
-                names = self._course.route_ids
-                raise ValueError(
-                    f"Routes '{names[other]}' and '{names[index]}' start less than "
-                    f"{START_APART_M:g} m apart; choose others."
-                )
-            chosen.append(index)
-        return chosen
-
-    def _too_near(self, index: int, chosen: list[int]) -> int | None:
-        """The one of the chosen routes whose start is too near that of another, if there is one."""
-        start = self.plans[index].points[0, :3]
-        for other in chosen:
-            if np.linalg.norm(self.plans[other].points[0, :3] - start) < START_APART_M:
-                return other
-        return None
 
 
 def parallel_env(egos: int = 2, *, render_mode: str | None = None, **options: Any) -> MultiEgoEnv:

@@ -28,7 +28,8 @@ from agents.carla.importing import entry_class
 from agents.carla.options import CarlaOptions, folders_of
 from agents.carla.plan import global_plan
 from agents.one_thread import one_thread
-from di_envs.sensors.carla_suite import CarlaSuite, SensorSuiteError, suite_of
+from di_envs.sensors.carla_sensor import SensorSuiteError
+from di_envs.sensors.carla_suite import CarlaSuite, suite_of
 from di_envs.town.plan import RoutePlan
 
 TICK_S = 0.05  # the Leaderboard's; an agent decides at every tick

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError
+from di_envs.sensors.carla_sensor import CarlaSensor, SensorSuiteError
 from di_envs.sensors.carla_types import SensorType
 from di_envs.world.kinds import TICK_S, ActorKind
 

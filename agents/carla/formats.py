@@ -26,7 +26,8 @@ from agents.carla.events import EventMemory, events_of
 from agents.carla.images import bgra, depth_image, empty_image, instance_image, semantic_image
 from agents.carla.plan import moved
 from agents.carla.tags import tags_of_version
-from di_envs.sensors.carla_suite import CarlaSensor, CarlaSuite, SensorSuiteError
+from di_envs.sensors.carla_sensor import CarlaSensor, SensorSuiteError
+from di_envs.sensors.carla_suite import CarlaSuite
 from di_envs.sensors.carla_types import EVENTS, IMAGES, LIDARS, STITCHED, SensorType
 
 InputData = dict[str, tuple[int, Any]]

@@ -31,7 +31,9 @@ ACTOR = {
     ActorKind.MOTORCYCLE: "#e3b7ff",
     ActorKind.BICYCLE: "#b6f2c4",
     ActorKind.WALKER: "#ffe14d",
-}
+    ActorKind.DEBRIS: "#9a7b55",
+    ActorKind.VENDING_MACHINE: "#b64a4a",
+}  # all but poles
 EDGE = "#30343a"  # of actors
 BRIDGE_M = 3.0  # what is higher is drawn over the streets below
 _ABOUT = np.array([0.0, 0.0, 0.0, np.pi])  # turns a pose to face backwards

@@ -243,7 +243,7 @@ class _Pen:
         state = view.state
         pixels = self._pixels(np.stack([state.x, state.y], axis=1))
         there = self._shown(pixels) & ((state.z > BRIDGE_M) == above)
-        there &= (state.kind != ActorKind.ABSENT) & (state.kind < ActorKind.PROP)
+        there &= (state.kind != ActorKind.ABSENT) & (state.kind != ActorKind.PROP)
         for actor in np.flatnonzero(there).tolist():
             if actor != ego:
                 self._actor(state, actor, pixels[actor], ACTOR[ActorKind(int(state.kind[actor]))])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from di_envs.sensors.carla_suite import SensorSuiteError as SensorConfigurationInvalid
+from di_envs.sensors.carla_sensor import SensorSuiteError as SensorConfigurationInvalid
 
 
 class SensorInterface:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,13 @@ from leaderboard.replaying.branch import Branch, branch_run
 from leaderboard.scoring.names import EVENT_NAMES
 
 PANEL_PX = 360
-_TEXT_PX, _TITLE_PX, _HEAD_PX, _GAP_PX, _LEGEND_PX = 14, 17, 34, 8, 34
+_TEXT_PX, _TITLE_PX, _HEAD_PX, _GAP_PX, _LINE_PX = 14, 17, 34, 8, 17
 _PAPER, _INK, _FAINT, _BAD = "#ffffff", "#1d2126", "#5b646c", "#c02a1f"
 MARK = "#d6006c"  # of edited actors: nothing else has this colour
+_SAID = {ActorKind.TRUCK: "lorry", ActorKind.VENDING_MACHINE: "vending machine"}
 _NAMES = {
     "ego": EGO,
-    **{"lorry" if kind is ActorKind.TRUCK else kind.name.lower(): ACTOR[kind] for kind in ACTOR},
+    **{_SAID.get(kind, kind.name.lower()): colour for kind, colour in ACTOR.items()},
     "route, target points": ROUTE,
     **{f"stop line: {state.name.lower()}": LIGHT[state] for state in LIGHT},
     "no light": "#ffffff",
@@ -53,7 +54,11 @@ def write_branch_picture(path: Path, run: RunRecord, branch: Branch) -> None:
     ]
     high = PANEL_PX + _HEAD_PX + _GAP_PX
     width = len(times_s) * (PANEL_PX + _GAP_PX) + _GAP_PX
-    picture = Image.new("RGB", (width, len(rows) * high + _LEGEND_PX), _PAPER)
+    marked = {f"actor {actor}, edited; crossed out: where it was": MARK for actor in actors[:1]}
+    colours = {**_NAMES, **marked}
+    places = _legend_places(colours, width)
+    bottom = (places[-1][1] + 2) * _LINE_PX
+    picture = Image.new("RGB", (width, len(rows) * high + bottom), _PAPER)
     moments = [list(moments_of(of_run, record, times_s, actors)) for _, of_run, record in rows]
     for number, (title, of_run, record) in enumerate(rows):
         line = f"{title}: driving score {record.score.driving_score:.1f}, {record.status}"
@@ -63,8 +68,7 @@ def write_branch_picture(path: Path, run: RunRecord, branch: Branch) -> None:
             place = (_GAP_PX + column * (PANEL_PX + _GAP_PX), number * high + _HEAD_PX)
             picture.paste(_panel(moment, was), place)
             _name(picture, place, moment, record, of_run)
-    marked = {f"actor {actor}, edited; crossed out: where it was": MARK for actor in actors[:1]}
-    _legend(picture, len(rows) * high + 8, {**_NAMES, **marked})
+    _legend(picture, len(rows) * high + 8, colours, places)
     picture.save(path)
 
 
@@ -132,12 +136,26 @@ def _name(
     _write(picture, (left + 6, top + 3), label, _BAD if now else _FAINT, _TEXT_PX)
 
 
-def _legend(picture: Any, top: int, colours: Mapping[str, str]) -> None:
-    left, pen = _GAP_PX, ImageDraw.Draw(picture)
-    for name, colour in colours.items():
-        pen.rectangle((left, top + 4, left + 14, top + 13), colour, EDGE)
-        _write(picture, (left + 19, top), name, _FAINT, _TEXT_PX - 1)
-        left += 19 + round(ImageFont.load_default(_TEXT_PX - 1).getlength(name)) + 12
+def _legend_places(names: Iterable[str], width: int) -> list[tuple[int, int]]:
+    """Where each entry begins [pixels], and in which line: as many in one as have room."""
+    places, left, line = [], _GAP_PX, 0
+    for name in names:
+        long = 19 + round(ImageFont.load_default(_TEXT_PX - 1).getlength(name))
+        if left > _GAP_PX and left + long > width - _GAP_PX:
+            left, line = _GAP_PX, line + 1
+        places.append((left, line))
+        left += long + 12
+    return places
+
+
+def _legend(
+    picture: Any, top: int, colours: Mapping[str, str], places: Iterable[tuple[int, int]]
+) -> None:
+    pen = ImageDraw.Draw(picture)
+    for (name, colour), (left, line) in zip(colours.items(), places, strict=True):
+        high = top + line * _LINE_PX
+        pen.rectangle((left, high + 4, left + 14, high + 13), colour, EDGE)
+        _write(picture, (left + 19, high), name, _FAINT, _TEXT_PX - 1)
 
 
 def _write(picture: Any, place: tuple[int, int], text: str, colour: str, size: int) -> None:

@@ -19,7 +19,7 @@ from agents.base import Agent, Requirements
 from agents.faults import AgentDiedError, agents_code, as_control, describe
 from agents.generators import Generators, generators
 from di_envs.rules import Rules
-from di_envs.sensors.carla_suite import SensorSuiteError
+from di_envs.sensors.carla_sensor import SensorSuiteError
 from di_envs.town.plan import RoutePlan
 from di_envs.world.world import WorldView
 from leaderboard.records.record import (

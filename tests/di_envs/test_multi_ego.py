@@ -12,8 +12,9 @@ from gymnasium.utils.env_checker import data_equivalence
 
 import di_envs
 from agents import load_agent
-from di_envs.multi_ego import START_APART_M, MultiEgoEnv
+from di_envs.multi_ego import MultiEgoEnv
 from di_envs.route_env import RouteEnv
+from di_envs.routes_apart import START_APART_M
 from di_envs.world.state import ActorKind, EventKind
 
 with warnings.catch_warnings():  # its tests import a game of its own in a way it deprecates

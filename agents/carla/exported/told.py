@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from di_envs.observer import odometry_of, prompt_observation
 from di_envs.prompt import COMPONENTS, StopLines, empty_prompt, prompt_route_of, stop_lines_of
 from di_envs.prompt_filling import fill_prompt
-from di_envs.sensors.carla_suite import SensorSuiteError
+from di_envs.sensors.carla_sensor import SensorSuiteError
 from di_envs.town.lanes import LightState, SignalKind
 from di_envs.town.loading import SIDECARS, SYNTHESISE, load_town
 from di_envs.town.map_chunks import POINTS, MapChunks, build_map_chunks

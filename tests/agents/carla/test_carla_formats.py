@@ -12,7 +12,8 @@ from hypothesis.strategies import floats
 from agents.carla.formats import gnss_at, imu_turned, input_data, lidar_points
 from agents.carla.images import bgra
 from agents.carla.plan import moved
-from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError, suite_of
+from di_envs.sensors.carla_sensor import CarlaSensor, SensorSuiteError
+from di_envs.sensors.carla_suite import suite_of
 from di_envs.sensors.carla_types import SensorType
 from di_envs.sensors.inertial import EARTH_RADIUS_M, geodetic
 from tests.agents.carla.scenes import Scene

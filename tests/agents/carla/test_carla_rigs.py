@@ -11,7 +11,8 @@ from agents.carla.events import EventMemory, events_of
 from agents.carla.formats import SEMANTIC_POINT, radar_points, with_origin
 from agents.carla.images import depth_image, instance_image, semantic_image
 from agents.carla.tags import tags_of_version
-from di_envs.sensors.carla_suite import CarlaSensor, SensorSuiteError, suite_of
+from di_envs.sensors.carla_sensor import CarlaSensor, SensorSuiteError
+from di_envs.sensors.carla_suite import suite_of
 from di_envs.sensors.carla_types import SensorType
 from di_envs.sensors.scene.tags import Tag
 from tests.agents.carla.scenes import Scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -15,12 +16,23 @@ import di_envs
 from di_envs.course import load_course
 from di_envs.drawing.driver_view import DriverView
 from di_envs.drawing.map_tiles import TILE_PX, MapTiles
-from di_envs.drawing.outlines import EGO, LAND, LIGHT, ROUTE, box, stop_line_colours, stop_line_ends
+from di_envs.drawing.outlines import (
+    ACTOR,
+    EGO,
+    LAND,
+    LIGHT,
+    ROUTE,
+    box,
+    stop_line_colours,
+    stop_line_ends,
+)
 from di_envs.drawing.prompt_text import prompt_in_words, where
 from di_envs.drawing.view import HEIGHT_PX, MAP_PX, PIXELS_A_METRE, WIDTH_PX, Renderer
 from di_envs.route_env import RouteEnv
 from di_envs.town.loading import load_town
 from di_envs.vector_env import RouteVectorEnv
+from di_envs.world.kinds import ActorKind
+from di_envs.world.state import views_of
 
 GO = np.array([0.7, 0.0, 0.0], np.float32)
 CENTRE = MAP_PX // 2
@@ -143,6 +155,22 @@ def test_a_picture_of_an_observation_is_the_one_that_render_gives():
     assert np.array_equal(seeing.picture(observation), rendered)
     assert not np.array_equal(seeing.picture({}), rendered)
     assert np.array_equal(seeing.picture({}), blind.render())
+
+
+@pytest.mark.parametrize("kind", [kind for kind in ActorKind if kind != ActorKind.ABSENT])
+def test_whatever_can_be_run_into_is_drawn_but_poles(started, kind):
+    snapshot = started.save_state()
+    record = np.atleast_1d(snapshot.world.record.copy())
+    state = views_of(record)
+    state.kind[1:] = ActorKind.ABSENT
+    state.kind[1], state.z[1], state.yaw[1] = kind, state.z[0], 0.0
+    state.x[1], state.y[1] = state.x[0], state.y[0] - 8.0
+    state.half_length[1], state.half_width[1], state.walk_waiting[1] = 0.6, 0.5, 0
+    world = dataclasses.replace(snapshot.world, record=record.reshape(snapshot.world.record.shape))
+    started.restore_state(dataclasses.replace(snapshot, world=world))
+    column, row = pixel_of(started, state.x[1], state.y[1])
+    drawn = near(started.render()[row, column], ACTOR.get(kind, LAND), by=8)
+    assert drawn == (kind != ActorKind.PROP)
 
 
 def test_tiles_meet_without_a_seam(env):

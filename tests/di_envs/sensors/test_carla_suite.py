@@ -7,7 +7,8 @@ import math
 import pytest
 
 from di_envs.config import RouteEnvConfig
-from di_envs.sensors.carla_suite import SensorSuiteError, suite_of
+from di_envs.sensors.carla_sensor import SensorSuiteError
+from di_envs.sensors.carla_suite import suite_of
 from di_envs.sensors.lidar.config import LIDARS
 
 LEVEL = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}
