@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.runtime.nrt import rtsys
 
 from di_envs.files.caches import cache_folders, warn_not_kept, writable_cache
 
@@ -74,6 +75,16 @@ class _InFolder(FunctionCache):
         name, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
         self._cache_file = IndexDataCacheFile(self._cache_path, name, stamp)
         self.enable()
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Code for a signature; None if there is none.
+
+        Numba would first import all that it can compile, a quarter of a second, of which code that
+        is compiled needs what counts references alone.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class _Files(CompileResultCacheImpl):

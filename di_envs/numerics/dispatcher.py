@@ -8,6 +8,7 @@ kernels, and none asks for more than values: that was a third of the time that a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import Any
 
 from numba.core import types as numba_types
@@ -37,15 +38,21 @@ class KernelDispatcher(CPUDispatcher):
     ) -> None:
         """Of a function; the other two arguments are Numba's own."""
         super().__init__(py_func, locals or {}, dict(targetoptions or _OPTIONS), KernelCompiler)
-        self.within = CPUDispatcher(
-            py_func, {}, _OPTIONS | {"no_cpython_wrapper": True}, IngredientCompiler
-        )
         self.parts: Callable[..., Iterable[Part]] | None = None
         self._begun: dict[tuple[Any, ...], Together] = {}
+        self._cache_within: NullCache = NullCache()
 
     def keep_in(self, cache: NullCache, cache_within: NullCache) -> None:
         """Says where its machine code is kept, as Numba's own `enable_caching` would."""
-        self._cache, self.within._cache = cache, cache_within
+        self._cache, self._cache_within = cache, cache_within
+
+    @cached_property
+    def within(self) -> Any:
+        """What other kernels call; most runs find all code in the caches and never ask for it."""
+        options = _OPTIONS | {"no_cpython_wrapper": True}
+        made = CPUDispatcher(self.py_func, {}, options, IngredientCompiler)
+        made._cache = self._cache_within
+        return made
 
     def prepare(self, given: tuple[Any, ...]) -> None:
         """Has its parts begun, unless its code for arguments of these types is at hand."""

@@ -117,6 +117,16 @@ class _Whole(JITCodeLibrary):
                 function.linkage = Linkage.internal
         super()._optimize_final_module()
 
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Its machine code, and what that defines: Numba keeps all that others could link there."""
+        self._ensure_finalized()
+        defined = (f for f in self._final_module.functions if not f.is_declaration)
+        names = (f.name for f in defined if f.linkage != Linkage.internal)
+        module = llvmlite.binding.parse_assembly(
+            "\n".join(f'define void @"{name}"() {{ ret void }}' for name in names)
+        )
+        return self.name, "object", (self._get_compiled_object(), module.as_bitcode())
+
 
 # Functions such as `math.sqrt`, types that numbers are made of, operators
 _OF_NUMBA = (numba_types.Function, numba_types.NumberClass, BuiltinFunctionType)

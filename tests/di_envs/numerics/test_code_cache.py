@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
 
 import numba
 import pytest
@@ -86,3 +88,22 @@ def test_numbas_own_cache_stays_where_the_user_has_put_it():
     import di_envs.world.step  # noqa: F401 (has kernels, which need a cache)
 
     assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
+
+
+A_STEP = """
+import sys
+import numpy as np
+from di_envs.route_env import RouteEnv
+env = RouteEnv(suite="toy", traffic=2, walkers=1, observations=("camera", "prompt"))
+env.reset(seed=0)
+env.step(np.array([0.5, 0.0, 0.0], np.float32))
+print("numba.np.linalg" in sys.modules)  # of all that Numba can compile
+"""
+
+
+def test_who_finds_all_code_does_not_load_what_compiles_it():
+    for _ in range(2):  # the first may compile
+        run = subprocess.run(
+            [sys.executable, "-c", A_STEP], capture_output=True, text=True, check=True
+        )
+    assert run.stdout == "False\n"
