@@ -32,14 +32,26 @@ class CodeCache(NullCache):
             part: Of the caches; it must name the function's source and all that it builds on.
         """
         self._function, self._part = function, part
+        self._found: dict[Any, Any] = {}  # code by signature, until it is asked for
 
     @property
     def cache_path(self) -> str:
         """Where it is read first."""
         return str(cache_folders(self._part)[0])
 
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Whether there is code for a signature; if so, it is kept for who asks for it next."""
+        if sig not in self._found:
+            code = self.load_overload(sig, target_context)
+            if code is None:
+                return False
+            self._found[sig] = code
+        return True
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Code for a signature; None if there is none that can be read."""
+        if sig in self._found:
+            return self._found.pop(sig)
         for folder in cache_folders(self._part):
             try:
                 code = _InFolder(self._function, folder).load_overload(sig, target_context)

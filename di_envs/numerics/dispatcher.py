@@ -16,6 +16,7 @@ from numba.core.caching import NullCache
 from numba.core.registry import CPUDispatcher
 from numba.core.typing import Signature
 
+from di_envs.numerics.code_cache import CodeCache
 from di_envs.numerics.ingredients import IngredientCompiler, KernelCompiler
 from di_envs.numerics.together import Part, Together
 
@@ -40,9 +41,9 @@ class KernelDispatcher(CPUDispatcher):
         super().__init__(py_func, locals or {}, dict(targetoptions or _OPTIONS), KernelCompiler)
         self.parts: Callable[..., Iterable[Part]] | None = None
         self._begun: dict[tuple[Any, ...], Together] = {}
-        self._cache_within: NullCache = NullCache()
+        self._cache_within = NullCache()
 
-    def keep_in(self, cache: NullCache, cache_within: NullCache) -> None:
+    def keep_in(self, cache: CodeCache, cache_within: CodeCache) -> None:
         """Says where its machine code is kept, as Numba's own `enable_caching` would."""
         self._cache, self._cache_within = cache, cache_within
 
@@ -57,7 +58,7 @@ class KernelDispatcher(CPUDispatcher):
     def prepare(self, given: tuple[Any, ...]) -> None:
         """Has its parts begun, unless its code for arguments of these types is at hand."""
         if self.parts and given not in self.overloads and given not in self._begun:
-            if self._cache.load_overload(given, self.targetctx) is None:
+            if not self._cache.holds(given, self.targetctx):
                 self._begun[given] = Together(list(self.parts(*given)), whole=(self, given))
 
     def compile(self, sig: Any) -> Any:

@@ -90,6 +90,18 @@ def test_numbas_own_cache_stays_where_the_user_has_put_it():
     assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
 
 
+def test_code_that_was_looked_for_is_read_once(places, monkeypatch):
+    cache, types = fresh()._cache, (numba.int64,)
+    assert not cache.holds(types, fresh().targetctx)
+    assert fresh()(4) == 8
+    assert cache.holds(types, fresh().targetctx)
+    for path in (places / "asked/kernels/one").iterdir():
+        path.unlink()
+    assert cache.holds(types, fresh().targetctx)
+    assert cache.load_overload(types, fresh().targetctx).entry_point(4) == 8
+    assert not cache.holds(types, fresh().targetctx)
+
+
 A_STEP = """
 import sys
 import numpy as np
