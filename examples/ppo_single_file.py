@@ -59,7 +59,7 @@ class Training:
     """Driven at once."""
 
     threads: int = 2
-    """For the worlds and for torch."""
+    """For the worlds; networks so small have one."""
 
     seed: int = 0
     """Of the networks and of the worlds."""
@@ -272,7 +272,7 @@ def learn(
 
 def train(training: Training, bar: Progress | None = None) -> tuple[Policy, Progressing]:
     """Trains a policy from nothing; says on a bar how it goes, if there is one."""
-    torch.set_num_threads(training.threads)
+    torch.set_num_threads(1)  # its others, while they wait, would keep a core from the worlds
     torch.manual_seed(training.seed)
     envs = make_worlds(training)
     policy, told = Policy(envs.single_observation_space.shape[0]), Progressing()
