@@ -156,12 +156,15 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
         """
         resets = self._ended & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         controls = checked_actions(actions, resets)
-        shares = self._worlds.ready(controls, resets, self.threads)
+        self._worlds.ready(controls, resets, self.threads)
         begun: dict[int, Info] = {}
         rows = self._looks.fresh()
         jobs = self._beginnings(np.flatnonzero(resets), rows, begun)
-        jobs += [partial(self._advance, begin, end, resets, rows) for begin, end in shares]
-        self._crew.each(jobs)
+        self._crew.each([*jobs, *[self._worlds.run] * self.threads])
+        if self._looks.with_sensors:
+            self._crew.each(
+                [partial(self._looks.measure, rows, i) for i in np.flatnonzero(~resets).tolist()]
+            )
         self._looks.add_prompts(rows)
         rewards, terminated, truncated, infos = self._worlds.outcome()
         self._steps[~resets] += 1
@@ -271,14 +274,6 @@ class RouteVectorEnv(Copyable, VectorEnv[Observation, NDArray[np.float32], NDArr
             self._looks.write(rows, index, observation)
 
         return [partial(begin, index) for index in indices.tolist()]
-
-    def _advance(self, begin: int, end: int, left: NDArray[np.bool_], rows: Observation) -> None:
-        """Steps the worlds [begin, end) but those that are left, and looks at them."""
-        self._worlds.run(begin, end)
-        if self._looks.with_sensors:
-            for index in range(begin, end):
-                if not left[index]:
-                    self._looks.measure(rows, index)
 
     def _restarts(self) -> bool:
         """Whether a step that ends an episode begins the next one, and some have ended."""

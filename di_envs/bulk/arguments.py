@@ -55,7 +55,8 @@ def checked_actions(actions: Any, resets: NDArray[np.bool_]) -> NDArray[np.float
             f"Actions have shape ({resets.size}, 3): throttle, steer, brake of each world; "
             f"got shape {rows.shape}."
         )
-    rows = np.where(resets[:, None], 0.0, rows)
+    if resets.any():
+        rows = np.where(resets[:, None], 0.0, rows)
     controls = rows.astype(np.float64)
     if not ((controls >= LOW) & (controls <= HIGH)).all():
         for row in rows:

@@ -15,6 +15,7 @@ from di_envs.bulk.fetching import fetch_traffic, fetch_walkers
 from di_envs.numerics.arrays import Float64, Int8, Int32
 from di_envs.numerics.bundle_rows import BundleRow
 from di_envs.numerics.bundles import by_reference
+from di_envs.numerics.counters import take_next
 from di_envs.numerics.kernels import kernel
 from di_envs.numerics.machine_code import MachineCode, call
 from di_envs.observer import ObservationParts
@@ -57,6 +58,7 @@ class Tally(NamedTuple):
     """What the kernel is told of N worlds, and what it says of their steps."""
 
     left: Int8  # (N,) 1 for a world that is left as it is
+    block: Int32  # (1,) the first block of worlds that no thread has taken yet
     controls: Float64  # (N, 3) throttle, steer, brake
     # of the last step that Python worked out: nothing that costs has happened as long as they hold
     counts: Int32  # (N, EVENT_KINDS) events
@@ -73,6 +75,7 @@ def make_tally(worlds: int, terms: int) -> Tally:
     """Arrays for so many worlds, and rewards of so many terms; nothing is known yet."""
     return Tally(
         left=np.zeros(worlds, np.int8),
+        block=np.zeros(1, np.int32),
         controls=np.zeros((worlds, 3)),
         counts=np.full((worlds, EVENT_KINDS), -1, np.int32),
         pace=np.zeros((worlds, CHECKPOINTS)),
@@ -98,49 +101,52 @@ def step_worlds(
     worlds: BundleRow[WorldParts],
     scratch: Scratch,
     tally: Tally,
-    begin: int,
-    end: int,
+    size: int,
     ticks: int,
     with_prompt: bool,
     with_inertial: bool,
 ) -> None:
-    """Steps the worlds [begin, end) that are not left out.
+    """Steps worlds that are not left out, a block of them after the other, until all are taken.
 
     Args:
         advance: Of `di_envs.world.step.advance`.
         look: Of `di_envs.observer.fill_observation`.
         worlds: All of them.
         scratch: Working memory, which no other thread uses meanwhile.
-        tally: Of all of them; only rows of these worlds are read and written.
-        begin: The first one.
-        end: Behind the last one.
+        tally: Of all of them; only rows of worlds that this call takes are read and written.
+        size: Worlds of a block.
         ticks: For how many ticks the controls are held.
         with_prompt: Whether prompts are written.
         with_inertial: Whether the inertial sensors are.
     """
-    for index in range(begin, end):
-        if tally.left[index]:
-            continue
-        world = worlds[index]
-        state = world.state
-        if index + 1 < end:
-            _fetch(worlds[index + 1])
-        _note_before(tally.before, state, index)
-        state.throttle[_EGO] = tally.controls[index, 0]
-        state.steer[_EGO] = tally.controls[index, 1]
-        state.brake[_EGO] = tally.controls[index, 2]
-        tally.events[index] = call(
-            advance,
-            state,
-            world.scenery,
-            scratch,
-            world.vehicle_end,
-            world.walker_end,
-            ticks,
-            world.event_rows,
-        )
-        call(look, world.sight, _EGO, with_prompt, with_inertial)
-        _count(tally, world, index)
+    count = tally.left.size
+    while True:
+        first = size * take_next(tally.block)
+        if first >= count:
+            return
+        for index in range(first, min(first + size, count)):
+            if tally.left[index]:
+                continue
+            world = worlds[index]
+            state = world.state
+            if index + 1 < count:
+                _fetch(worlds[index + 1])
+            _note_before(tally.before, state, index)
+            state.throttle[_EGO] = tally.controls[index, 0]
+            state.steer[_EGO] = tally.controls[index, 1]
+            state.brake[_EGO] = tally.controls[index, 2]
+            tally.events[index] = call(
+                advance,
+                state,
+                world.scenery,
+                scratch,
+                world.vehicle_end,
+                world.walker_end,
+                ticks,
+                world.event_rows,
+            )
+            call(look, world.sight, _EGO, with_prompt, with_inertial)
+            _count(tally, world, index)
 
 
 @kernel

@@ -27,7 +27,7 @@ from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
 from di_envs.world.step import Scratch, advance
 from di_envs.world.world import event_of_row
 
-SHARES = 4  # a thread, so that one that is done early takes some more
+BLOCKS = 2  # a thread, so that one that is done early takes some more
 
 
 class Outcome(NamedTuple):
@@ -55,29 +55,25 @@ class Worlds:
         self._sights: list[ObservationParts | None] = [None] * len(envs)
         self._row: BundleRow[WorldParts] | None = None
         self._scratches: list[Scratch] = []
+        self._block = len(envs)
         self._route_id = np.full(len(envs), "", object)
         self._world_seed = np.zeros(len(envs), np.int64)
         self._codes: tuple[MachineCode, MachineCode]
         self._kernel: Any = None
 
-    def ready(
-        self, controls: NDArray[np.float64], left: NDArray[np.bool_], threads: int
-    ) -> list[tuple[int, int]]:
+    def ready(self, controls: NDArray[np.float64], left: NDArray[np.bool_], threads: int) -> None:
         """Prepares a step of all worlds but those that are left as they are.
 
         Args:
             controls: (N, 3) throttle, steer, brake, checked.
             left: (N,) the worlds that are left.
-            threads: How many will call `run` at a time.
-
-        Returns:
-            Shares of the worlds, each for one call of `run`.
+            threads: How many will call `run`.
 
         Raises:
             gymnasium.error.ResetNeeded: If another one has no episode to step.
         """
-        for index, env in enumerate(self._envs):
-            if left[index]:
+        for index, (env, is_left) in enumerate(zip(self._envs, left.tolist(), strict=True)):
+            if is_left:
                 continue
             if env.over:
                 raise gymnasium.error.ResetNeeded(
@@ -88,24 +84,23 @@ class Worlds:
                 self._take(index)
         self._tally.left[:] = left
         self._tally.controls[:] = controls
-        if left.all():
-            return []
-        self._bind(threads)
-        size = len(self._envs) if threads == 1 else -(-len(self._envs) // (SHARES * threads))
-        return self.shares(size)
+        self._tally.block[0] = 0
+        self._block = -(-len(self._envs) // (1 if threads == 1 else BLOCKS * threads))
+        if not left.all():
+            self._bind(threads)
 
-    def shares(self, size: int) -> list[tuple[int, int]]:
-        """The worlds by so many: (first, behind the last) of each share."""
-        count = len(self._envs)
-        return [(begin, min(begin + size, count)) for begin in range(0, count, size)]
+    def run(self) -> None:
+        """Steps worlds and writes their tables, without Python's lock, until none is left to step.
 
-    def run(self, begin: int, end: int) -> None:
-        """Steps the worlds [begin, end) and writes their tables, without Python's lock."""
+        Any number of threads, up to what `ready` was told, may call it at once.
+        """
+        if self._tally.left.all():
+            return
         scratch = self._scratches.pop()
         observer = self._envs[0].observer
         try:
             self._kernel(
-                *self._codes, self._row, scratch, self._tally, begin, end, self._ticks,
+                *self._codes, self._row, scratch, self._tally, self._block, self._ticks,
                 observer.with_prompt, observer.with_inertial,
             )  # fmt: skip
         finally:
@@ -164,7 +159,7 @@ class Worlds:
             MachineCode(fill_observation, world.sight, 0, True, True),
         )
         self._kernel = bind(
-            step_worlds, *self._codes, self._row, scratch, self._tally, 0, 1, 1, True, True
+            step_worlds, *self._codes, self._row, scratch, self._tally, 1, 1, True, True
         )
 
     def _scratch(self) -> Scratch:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 
 import pytest
@@ -41,6 +42,39 @@ def test_what_a_job_raises_comes_out_once_the_others_are_done():
         crew.each([fail, *(lambda index=index: done.append(index) for index in range(20))])
     assert sorted(done) == list(range(20))
     crew.close()
+
+
+def test_interrupted_it_does_the_next_jobs_whole():
+    crew, release, late = Crew(2), threading.Event(), []
+
+    def wait():
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        release.wait(20.0)
+        late.append(1)
+
+    threading.Timer(0.2, release.set).start()
+    with pytest.raises(KeyboardInterrupt):
+        crew.each([wait, wait])
+    done = []
+    crew.each([lambda index=index: done.append(index) for index in range(20)])
+    assert sorted(done) == list(range(20))
+    crew.close()
+
+
+@pytest.mark.parametrize("let_go", [Crew.close, lambda _crew: None], ids=["closed", "dropped"])
+def test_its_threads_end_with_it(let_go):
+    before = set(threading.enumerate())
+    crew = Crew(3)
+    crew.each([threading.Barrier(3, timeout=20.0).wait] * 3)
+    helpers = set(threading.enumerate()) - before
+    assert len(helpers) == 2
+    let_go(crew)
+    del crew
+    gc.collect()
+    for helper in helpers:
+        helper.join(timeout=20.0)
+        assert not helper.is_alive()
 
 
 def test_a_closed_crew_works_no_more():
