@@ -27,7 +27,7 @@ from di_envs.world.events.rows import COLUMNS, ROWS_PER_EGO
 from di_envs.world.step import Scratch, advance
 from di_envs.world.world import event_of_row
 
-BLOCKS = 2  # a thread, so that one that is done early takes some more
+BLOCK = 2  # worlds that a thread takes at a time
 
 
 class Outcome(NamedTuple):
@@ -55,7 +55,7 @@ class Worlds:
         self._sights: list[ObservationParts | None] = [None] * len(envs)
         self._row: BundleRow[WorldParts] | None = None
         self._scratches: list[Scratch] = []
-        self._block = len(envs)
+        self._block = 1
         self._route_id = np.full(len(envs), "", object)
         self._world_seed = np.zeros(len(envs), np.int64)
         self._codes: tuple[MachineCode, MachineCode]
@@ -85,7 +85,7 @@ class Worlds:
         self._tally.left[:] = left
         self._tally.controls[:] = controls
         self._tally.block[0] = 0
-        self._block = -(-len(self._envs) // (1 if threads == 1 else BLOCKS * threads))
+        self._block = min(BLOCK, -(-len(self._envs) // threads))
         if not left.all():
             self._bind(threads)
 
