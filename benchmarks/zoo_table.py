@@ -1,14 +1,12 @@
 """The zoo in one table, beside what the paper's Table 1 says, and how alike the two orders are.
 
-    driveinsight evaluate --agent transfuser --suite town05_short --seeds 3 --output t-short
-    driveinsight evaluate --agent transfuser --suite town05_long --seeds 1 --output t-long
-    ...
-    python -m benchmarks.zoo_table t-short t-long ...
+    python -m benchmarks.zoo_table
 
-Give the folders of all systems together; `--brief` prints what the README has. SR is the share of
-drives that were completed without an infraction. Samples seen are those with pictures, after a +
-those of a planner alone, of all stages of its recipe whose weights it begins with, a teacher's too.
-Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
+It is of every network that has a record on the leaderboard (`docs/records`, to which
+`docs/scripts/leaderboard_page.py --add RUN` adds). `--brief` prints what the README has. SR is the
+share of drives that were completed without an infraction. Samples seen are those with pictures and,
+after a + those of a planner alone, of all stages of its recipe whose weights it begins with, and a
+teacher's. Parameters and milliseconds are of `benchmarks/zoo.py`, which measures them anew here.
 Spearman's correlation is of the mean DS with the paper's, over the systems that both have; its
 intervals say how far it could have come out otherwise with other routes (95 %, bootstrap over
 routes, all systems on the same ones) and with other systems (95 %, Fieller, Hartley, Pearson: Tests
@@ -21,7 +19,6 @@ import argparse
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,13 +32,9 @@ from agents.sb3.agent import Sb3Agent
 from agents.zoo.registry import system_names
 from benchmarks.samples_seen import samples_seen
 from benchmarks.zoo import decision_ms, parameters_of, system_cost
-from di_envs.rules import rules_named
-from leaderboard.records.record import RouteRecord, RunRecord
-from leaderboard.records.results import ResultsError, read_run
+from docs.scripts.leaderboard_page import Record, column, infractions_a_km, interval, read_records
 from leaderboard.statistics.bootstrap import TAIL, expanded_interval, resampled_means
-from leaderboard.statistics.confidence import mean_interval
 from leaderboard.statistics.rank_correlation import spearman
-from leaderboard.tables.run_tables import driving_interval, scored_per_km, seed_means
 
 SUITES = ("town05_short", "town05_long")
 DRAWS = 2000  # of the routes, for the correlation's interval
@@ -89,30 +82,24 @@ TABLE_1 = {
 TWICE = "driveinsight"  # in the paper's order too, but with Town05 in training: compared once
 
 
-def success_rate(run: RunRecord) -> float:
+def success_rate(record: Record) -> float:
     """The share of drives that were completed with no infraction that lowers the score, in %."""
-    scored = rules_named(run.rules).scored
-
-    def whole(record: RouteRecord) -> bool:
-        events = any(event.kind in scored for event in record.events)
-        return record.score.route_completion >= 100.0 and not events
-
-    return 100.0 * sum(map(whole, run.routes)) / len(run.routes)
+    drives = zip(
+        column(record, "route_completion"), column(record, "infraction_score"), strict=True
+    )
+    whole = [completion >= 100.0 and kept >= 1.0 for completion, kept in drives]
+    return 100.0 * sum(whole) / len(whole)
 
 
-def _cells(run: RunRecord | None) -> list[str]:
-    if run is None:
+def _cells(record: Record | None) -> list[str]:
+    if record is None:
         return ["-"] * len(COLUMNS)
-    means = {
-        name: mean_interval(seed_means(run.routes, name, run.seeds)).mean
-        for name in ("route_completion", "infraction_score")
-    }
     return [
-        str(driving_interval(run)) + ("" if run.complete else " (not complete)"),
-        f"{means['route_completion']:.1f}",
-        f"{means['infraction_score']:.2f}",
-        f"{success_rate(run):.0f}",
-        f"{scored_per_km(run.routes, run):.2f}",
+        str(interval(record, "driving_score")),
+        f"{interval(record, 'route_completion').mean:.1f}",
+        f"{interval(record, 'infraction_score').mean:.2f}",
+        f"{success_rate(record):.0f}",
+        infractions_a_km(record),
     ]
 
 
@@ -137,7 +124,7 @@ def _network_of(agent: Agent[Any]) -> nn.Module | None:
     return agent.network if isinstance(agent, Sb3Agent) else None
 
 
-def _row(name: str, runs: Mapping[str, RunRecord]) -> dict[str, str]:
+def _row(name: str, records: Mapping[str, Record]) -> dict[str, str]:
     """The cells of a row, by the names of their columns."""
     paper = TABLE_1.get(name)
     theirs = ["-", "-", "-"]
@@ -145,7 +132,7 @@ def _row(name: str, runs: Mapping[str, RunRecord]) -> dict[str, str]:
         pairs = (paper.short, paper.long)
         theirs = ["-" if pair is None else f"{pair[0]} / {pair[1]}" for pair in pairs]
         theirs.append(paper.town05)
-    cells = [cell for suite in SUITES for cell in _cells(runs.get(suite))]
+    cells = [cell for suite in SUITES for cell in _cells(records.get(suite))]
     seen = samples_seen(name) or "-"
     whole = [f"`{name}`", *cells, str(seen), *cost_of(name), *theirs]
     return dict(zip(HEADER, whole, strict=True))
@@ -156,39 +143,35 @@ def line_of(cells: Mapping[str, str], columns: Sequence[str]) -> str:
     return f"| {' | '.join(cells[column] for column in columns)} |"
 
 
-def rank_line(suite: str, found: Mapping[str, Mapping[str, RunRecord]]) -> str:
+def rank_line(suite: str, found: Mapping[str, Mapping[str, Record]]) -> str:
     """How alike our order and the paper's are on a suite."""
     pairs = {
-        name: (runs[suite], paper.ds(suite))
-        for name, runs in found.items()
-        if suite in runs and name != TWICE and (paper := TABLE_1.get(name)) is not None
+        name: (records[suite], paper.ds(suite))
+        for name, records in found.items()
+        if suite in records and name != TWICE and (paper := TABLE_1.get(name)) is not None
     }
-    known = {name: (run, ds) for name, (run, ds) in pairs.items() if ds is not None}
+    known = {name: (record, ds) for name, (record, ds) in pairs.items() if ds is not None}
     theirs = [ds for _, ds in known.values()]
-    ours = [driving_interval(run).mean for run, _ in known.values()]
+    ours = [interval(record, "driving_score").mean for record, _ in known.values()]
     rho = spearman(ours, theirs)
     if rho is None:
         return f"`{suite}`: {len(known)} systems are in both: too few for a correlation."
     return (
         f"`{suite}`: Spearman's {rho:+.2f} over {len(known)} systems ({', '.join(known)}); "
-        f"with other routes {_over_routes([run for run, _ in known.values()], theirs)}, "
+        f"with other routes {_over_routes([record for record, _ in known.values()], theirs)}, "
         f"with other systems {_over_systems(rho, len(known))}."
     )
 
 
-def _over_routes(runs: Sequence[RunRecord], theirs: Sequence[float]) -> str:
-    """The interval over routes, of which all runs have the same."""
+def _over_routes(records: Sequence[Record], theirs: Sequence[float]) -> str:
+    """The interval over routes, of which all records have the same."""
     means = [
-        resampled_means(
-            [record.score.driving_score for record in run.routes],
-            [record.route_id for record in run.routes],
-            DRAWS,
-        )
-        for run in runs
+        resampled_means(column(record, "driving_score"), column(record, "route"), DRAWS)
+        for record in records
     ]
-    routes = {tuple(sorted({record.route_id for record in run.routes})) for run in runs}
+    routes = {tuple(sorted(set(column(record, "route")))) for record in records}
     if len(routes) != 1 or any(each is None for each in means):
-        return "not known: the runs are not of the same routes"
+        return "not known: the records are not of the same routes"
     drawn = np.stack(means, axis=1)  # type: ignore[arg-type]
     found = [spearman(list(row), theirs) for row in drawn]
     known = np.array([each for each in found if each is not None])
@@ -209,29 +192,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folders", nargs="+", type=Path, help="folders of finished runs")
     parser.add_argument("--brief", action="store_true", help="the README's columns alone")
-    options = parser.parse_args()
-    columns = BRIEF if options.brief else HEADER
-    found: dict[str, dict[str, RunRecord]] = {}
-    try:
-        for run in map(read_run, options.folders):
-            if run.suite not in SUITES:
-                parser.error(f"a run on {run.suite}: expected {' or '.join(SUITES)}")
-            if run.suite in found.setdefault(run.agent, {}):
-                parser.error(f"two runs of {run.agent} on {run.suite}: give one")
-            found[run.agent][run.suite] = run
-    except ResultsError as error:
-        parser.error(str(error))
+    columns = BRIEF if parser.parse_args().brief else HEADER
+    found: dict[str, dict[str, Record]] = {}
+    for record in read_records().values():
+        if record["suite"] in SUITES:
+            found.setdefault(record["agent"], {})[record["suite"]] = record
 
     def rank(name: str) -> tuple[float, ...]:
-        runs = found[name]
-        return tuple(-driving_interval(runs[s]).mean if s in runs else 0.0 for s in SUITES[::-1])
+        driven = [found[name].get(suite) for suite in SUITES[::-1]]
+        return tuple(0.0 if r is None else -interval(r, "driving_score").mean for r in driven)
 
     print(line_of(dict(zip(HEADER, HEADER, strict=True)), columns))
     print(f"|---|{'---:|' * (len(columns) - 1)}")
     for name in sorted(found, key=rank):
-        print(line_of(_row(name, found[name]), columns), flush=True)
+        row = _row(name, found[name])
+        if row["parameters"] != "-":  # a network
+            print(line_of(row, columns), flush=True)
     print(*("\n" + rank_line(suite, found) for suite in SUITES), sep="")
 
 

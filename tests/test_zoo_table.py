@@ -10,7 +10,7 @@ import pytest
 from benchmarks.samples_seen import samples_seen
 from benchmarks.zoo_table import BRIEF, HEADER, TABLE_1, cost_of, main, rank_line, success_rate
 from di_envs.world.kinds import EventKind
-from leaderboard.records.results import write_run
+from docs.scripts.leaderboard_page import record_of
 from leaderboard.scoring.score import Score
 from tests.leaderboard.made_records import event, route, run_of
 
@@ -25,12 +25,12 @@ PAPER = (
 
 
 def driven(name, scores):
-    """A run on Long with so many points on each route."""
+    """The record of a run on Long with so many points on each route."""
     records = [
         route(str(index), index=index, score=Score(route_completion=score, infraction_score=1.0))
         for index, score in enumerate(scores)
     ]
-    return run_of(*records, agent=name, seeds=(0,))
+    return record_of(run_of(*records, agent=name, seeds=(0,)))
 
 
 def line(points):
@@ -75,7 +75,7 @@ def test_other_routes_cannot_be_told_where_systems_drove_different_ones():
     found = {
         name: {"town05_long": driven(name, [10.0 * n] * (10 + n))} for n, name in enumerate(PAPER)
     }
-    assert "the runs are not of the same routes" in rank_line("town05_long", found)
+    assert "the records are not of the same routes" in rank_line("town05_long", found)
 
 
 def test_a_system_that_the_paper_has_twice_or_not_at_all_is_not_compared():
@@ -86,8 +86,10 @@ def test_a_system_that_the_paper_has_twice_or_not_at_all_is_not_compared():
 
 def test_a_success_is_a_whole_route_without_a_scored_infraction():
     half = route("2", score=Score(route_completion=50.0, infraction_score=1.0))
-    red = route("3", events=(event(EventKind.RED_LIGHT, other=3),))
-    assert success_rate(run_of(route("1"), half, red, route("4"), seeds=(0,))) == 50.0
+    run_red = Score(route_completion=100.0, infraction_score=0.7)
+    red = route("3", score=run_red, events=(event(EventKind.RED_LIGHT, other=3),))
+    record = record_of(run_of(route("1"), half, red, route("4"), seeds=(0,)))
+    assert success_rate(record) == 50.0
 
 
 def test_samples_seen_are_of_all_stages_whose_weights_it_begins_with():
@@ -112,11 +114,16 @@ def test_policies_systems_and_what_stable_baselines_learned_have_a_cost(name):
     assert spent_ms.isdigit(), "whole milliseconds, 0 for the smallest"
 
 
-def test_the_readmes_table_is_of_columns_of_the_large_one(tmp_path, capsys, monkeypatch):
-    write_run(tmp_path, driven("constant", [50.0]))
-    monkeypatch.setattr("sys.argv", ["zoo_table", "--brief", str(tmp_path)])
+def test_the_readmes_table_is_of_columns_of_the_large_one(capsys, monkeypatch):
+    records = {
+        "short": {**driven("constant", [50.0]), "suite": "town05_short"},
+        "long": driven("ego-only", [50.0]),
+    }
+    monkeypatch.setattr("benchmarks.zoo_table.read_records", lambda: records)
+    monkeypatch.setattr("sys.argv", ["zoo_table", "--brief"])
     main()
-    head, _, row, *_ = capsys.readouterr().out.splitlines()
+    head, _, row, *rest = capsys.readouterr().out.splitlines()
+    assert "constant" not in "".join([row, *rest]), "it is no network"
     cells = dict(zip(head.split(" | "), row.split(" | "), strict=True))
     assert set(BRIEF) <= set(HEADER)
     assert cells["Long DS"] == "50.0"

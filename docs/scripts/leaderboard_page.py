@@ -118,8 +118,6 @@ def tables(records: Mapping[str, Record]) -> str:
 
 def line(place: str, record: Record) -> str:
     """A record as a row of its table."""
-    km = math.fsum(column(record, "km"))
-    count = sum(record["infractions"].values())
     bounds = [bound for bound in column(record, "bound") if bound is not None]
     version = re.sub(r"(files \w{8})\w+", r"\1…", record["agent_version"])  # whole in the record
     cells = (
@@ -129,11 +127,17 @@ def line(place: str, record: Record) -> str:
         str(interval(record, "route_completion")),
         f"{interval(record, 'infraction_score').mean:.2f}",
         f"{math.fsum(bounds) / len(bounds):.1f}" if bounds else "-",
-        f"{count / km:.2f}" if km > 0.0 else "-",
+        infractions_a_km(record),
         str(len(record["seeds"])),
         f"[{Path(place).name}]({place})",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def infractions_a_km(record: Record) -> str:
+    """Infractions that lower IS, per kilometre driven."""
+    km = math.fsum(column(record, "km"))
+    return f"{sum(record['infractions'].values()) / km:.2f}" if km > 0.0 else "-"
 
 
 def interval(record: Record, name: str) -> MeanInterval:
