@@ -2,13 +2,17 @@
 
     python benchmarks/vector_rate.py
 
-Prints rates and asserts nothing. Rates are by the wall clock, so other work on the machine hides
-what threads gain: `cores` says how many were at work, and rounds with fewer than there are threads
-say little. `of one` is the median of the rounds' ratios to one environment in the same round.
-`CPU us` is processor time a step of one world, `alone` the part of it that one thread does while
-the others wait; `could be` is what these times allow, likewise by rounds: that of one environment
-by (alone + the rest / threads). The row `two processes` is of one environment in each of two
-processes that share nothing: no threads of one process can gain more on this machine.
+Prints rates and asserts nothing. All rows drive the same episodes, those of seeds from 0 on, and
+are timed over the same steps of each: traffic costs more where it moves than once it waits behind
+an ego that stands, so a long episode is no measure of many short ones. One environment drives
+them one after the other. Rates are by the wall clock, so other work on the machine hides what
+threads gain: `cores` says how many were at work, and rounds with fewer than there are threads say
+little. `of one` is the median of the rounds' ratios to one environment, over the same episodes in
+the same round. `CPU us` is processor time a step of one world, `alone` the part of it that one
+thread does while the others wait; `could be` is what these times allow, likewise by rounds: that
+of one environment by (alone + the rest / threads). The row `two processes` is of one environment
+in each of two processes that share nothing and the episodes between them: no threads of one
+process can gain more on this machine.
 """
 
 from __future__ import annotations
@@ -34,9 +38,9 @@ from di_envs.numerics.kernels import cpu_capability
 from di_envs.vector_env import RouteVectorEnv
 
 GROUPS = {"prompt": ("prompt",), "camera, lidar, prompt": ("camera", "lidar", "prompt")}
-ONE = "one environment"
 APART = "two processes"
-ROUND_STEPS = {"prompt": 1536, "camera, lidar, prompt": 128}  # of all worlds together
+STEPS = {"prompt": 96, "camera, lidar, prompt": 8}  # of each episode that are timed, in a row
+FIRST = 4  # steps of each that are not: what they meet has just been made
 CONTROL = np.array([0.0, 0.0, 1.0], np.float32)  # stands, so that no world ends
 
 
@@ -80,7 +84,7 @@ class ClockedWorlds(RouteVectorEnv):
 
 
 class Apart:
-    """One environment in each of two processes, stepped at the same time."""
+    """One environment in each of two processes, at work at the same time."""
 
     def __init__(self, env_id: str, groups: str) -> None:
         context = multiprocessing.get_context("spawn")
@@ -90,11 +94,11 @@ class Apart:
             context.Process(target=_serve, args=(theirs, env_id, groups), daemon=True).start()
             self._ends.append(ours)
 
-    def timed(self, times: int) -> Round:
-        """Steps each so often; the rate is of both together."""
-        for end in self._ends:
-            end.send(times)
-        found: list[Round] = [end.recv() for end in self._ends]
+    def timed(self, episodes: int) -> Round:
+        """Drives so many episodes, half of them in each; the rate is of both together."""
+        for first, end in enumerate(self._ends):
+            end.send(range(first, episodes, len(self._ends)))
+        found = [together(end.recv()) for end in self._ends]
         return Round(
             steps_per_s=sum(own.steps_per_s for own in found),
             cores=sum(own.cores for own in found),
@@ -105,30 +109,44 @@ class Apart:
     def close(self) -> None:
         """Ends both."""
         for end in self._ends:
-            end.send(0)
+            end.send(None)
 
 
 def _serve(end: Connection, env_id: str, groups: str) -> None:
     env = gymnasium.make(env_id, observations=GROUPS[groups]).unwrapped
-    while times := end.recv():
-        end.send(timed(env, CONTROL, times, 1))
+    while (seeds := end.recv()) is not None:
+        end.send([timed(env, CONTROL, STEPS[groups], 1, seed) for seed in seeds])
 
 
-def timed(env: Any, action: Any, times: int, worlds: int) -> Round:
-    """Steps some worlds so often, from the start of their episodes."""
-    env.reset(seed=0)
+def timed(env: Any, action: Any, steps: int, worlds: int, seed: int) -> Round:
+    """Steps some worlds so often, a little after the start of their episodes."""
+    env.reset(seed=seed)
     crew = env.crew if isinstance(env, ClockedWorlds) else Clocked(1)
+    for _ in range(FIRST):
+        env.step(action)
     crew.shared_s = 0.0
     wall, cpu = time.perf_counter(), time.process_time()
-    for _ in range(times):
+    for _ in range(steps):
         env.step(action)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    steps = times * worlds
+    count = steps * worlds
     return Round(
-        steps_per_s=steps / wall,
+        steps_per_s=count / wall,
         cores=cpu / wall,
-        cpu_us=1e6 * cpu / steps,
-        alone_us=1e6 * (cpu - crew.shared_s) / steps,
+        cpu_us=1e6 * cpu / count,
+        alone_us=1e6 * (cpu - crew.shared_s) / count,
+    )
+
+
+def together(episodes: Sequence[Round]) -> Round:
+    """Of as many steps each, one after the other."""
+    wall_us = [1e6 / own.steps_per_s for own in episodes]
+    cpu_us = statistics.fmean(own.cpu_us for own in episodes)
+    return Round(
+        steps_per_s=1e6 / statistics.fmean(wall_us),
+        cores=cpu_us / statistics.fmean(wall_us),
+        cpu_us=cpu_us,
+        alone_us=statistics.fmean(own.alone_us for own in episodes),
     )
 
 
@@ -136,27 +154,42 @@ def measure(groups: str, env_id: str, numbers: Sequence[int], rounds: int) -> Ta
     """One environment and many worlds, taking turns."""
     options = {"observations": GROUPS[groups]}
     given = {**gymnasium.spec(env_id).kwargs, **options}
-    made: dict[str, tuple[Any, Any, int, int]] = {}  # environment, action, worlds, threads
-    made[ONE] = gymnasium.make(env_id, **options).unwrapped, CONTROL, 1, 1
-    made[APART] = Apart(env_id, groups), CONTROL, 1, 2
-    for worlds, threads in itertools.product(numbers, (1, 2)):
-        many = ClockedWorlds(worlds, threads=threads, **given)
-        name = f"{worlds} worlds, {threads} thread{'s' if threads > 1 else ''}"
-        made[name] = many, np.tile(CONTROL, (worlds, 1)), worlds, threads
-    results: dict[str, list[Round]] = {name: [] for name in made}
+    one, apart = gymnasium.make(env_id, **options).unwrapped, Apart(env_id, groups)
+    made = {
+        (worlds, threads): ClockedWorlds(worlds, threads=threads, **given)
+        for worlds, threads in itertools.product(numbers, (1, 2))
+    }
+    steps, most = STEPS[groups], max(numbers)
+    alone: dict[int, list[Round]] = {worlds: [] for worlds in numbers}
+    results: dict[str, tuple[int, int, list[Round]]] = {}  # worlds, threads
     for _ in range(rounds + 1):
-        for name, (env, action, worlds, _) in made.items():
-            times = ROUND_STEPS[groups] // worlds
-            apart = isinstance(env, Apart)
-            results[name].append(env.timed(times) if apart else timed(env, action, times, worlds))
-    for env, *_ in made.values():
+        episodes = [timed(one, CONTROL, steps, 1, seed) for seed in range(most)]
+        for worlds in numbers:
+            own = together(episodes[:worlds])
+            alone[worlds].append(own)
+            _add(results, f"one environment, {worlds} episodes", worlds, 1, own)
+        _add(results, f"{APART}, {most} episodes", most, 2, apart.timed(most))
+        for (worlds, threads), many in made.items():
+            actions = np.tile(CONTROL, (worlds, 1))
+            name = f"{worlds} worlds, {threads} thread{'s' if threads > 1 else ''}"
+            _add(results, name, worlds, threads, timed(many, actions, steps, worlds, 0))
+    for env in (one, apart, *made.values()):
         env.close()
     columns = ("", "steps/s", "best", "of one", "cores", "CPU us", "alone", "could be")
     table = Table(*columns, title=groups)
-    alone = results[ONE][1:]  # the first round warms up
-    for name, found in results.items():
-        table.add_row(name, *cells(found[1:], alone, made[name][3]))
+    for name, (worlds, threads, found) in results.items():
+        table.add_row(name, *cells(found[1:], alone[worlds][1:], threads))  # the first warms up
     return table
+
+
+def _add(
+    results: dict[str, tuple[int, int, list[Round]]],
+    name: str,
+    worlds: int,
+    threads: int,
+    own: Round,
+) -> None:
+    results.setdefault(name, (worlds, threads, []))[2].append(own)
 
 
 def cells(found: Sequence[Round], alone: Sequence[Round], threads: int) -> tuple[str, ...]:
