@@ -40,6 +40,8 @@ class TownStyle:
         bend_m: How far the middle of a long street lies aside, at most.
         shift_m: How far a node lies from its place in the grid, at most.
         raised: Share of the long streets that lead over a viaduct.
+        late_changes: Share of the junctions before whose line a route changes lane at the last
+            moment, where there is a lane beside.
         vehicles: Of the traffic.
         walkers: Beside it.
     """
@@ -54,6 +56,7 @@ class TownStyle:
     bend_m: float = 0.0
     shift_m: float = 2.0
     raised: float = 0.0
+    late_changes: float = 0.0
     vehicles: int = 60
     walkers: int = 40
 

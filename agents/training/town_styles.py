@@ -99,7 +99,9 @@ TRAINING_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
     }
 )
 
-# A town of which eyes learn what stands beside and under roads elsewhere: decks, rails, pillars
+# Two towns more. Of the first eyes learn what stands beside and under roads elsewhere: decks, rails,
+# pillars. In the other one planners learn what the routes of CARLA's towns ask for and the seven's
+# do not: to change lane within the last metres before a junction's line, by or behind its queue
 MADE_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
     {
         **TRAINING_TOWNS,
@@ -114,6 +116,18 @@ MADE_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
             raised=0.6,
             vehicles=150,
             walkers=60,
+        ),
+        "late_changes": TownStyle(
+            columns=5,
+            rows=4,
+            block_m=(110.0, 180.0),
+            sections={"highway": _HIGHWAY, "avenue": _AVENUE, "parked": _PARKED},
+            lines=("highway", "avenue", "avenue", "parked"),
+            lights=0.9,
+            bend_m=12.0,
+            late_changes=1.0,
+            vehicles=150,
+            walkers=50,
         ),
     }
 )

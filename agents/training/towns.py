@@ -210,10 +210,11 @@ def random_routes(town: Town, name: str, block: int, taken: NDArray[np.float64])
         taken: (K, 2, 2) starts and ends that no route of these may share.
     """
     graph, routes = build_road_graph(town), list[RouteSpec]()
+    late = MADE_TOWNS[name].late_changes if name in MADE_TOWNS else 0.0
     for number in range(block * ROUTES, (block + 1) * ROUTES):
         dice = random.Random(f"{name} route {number}")
         for _ in range(WAYS_A_ROUTE):
-            way = random_way(town.lanes, dice.uniform(*ROUTE_M), dice)
+            way = random_way(town.lanes, dice.uniform(*ROUTE_M), dice, late_changes=late)
             route = find_route(graph, way, str(number), town.name) if way else None
             if route is not None and _is_apart(route, taken):
                 routes.append(route)

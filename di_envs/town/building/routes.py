@@ -39,6 +39,7 @@ LONG_LENGTHS_M = (2000.0, 1800.0, 1600.0, 1400.0, 1300.0, 1200.0, 1100.0, 1000.0
 WALKS_A_ROUTE = 1500  # random drives from which each long route is chosen
 METRES_A_JUNCTION = 108.0  # the official Long routes have 11.5 junctions on 1290 m
 METRES_A_CHANGE = 225.0  # and 5.3 lane changes; the walks come out a little below
+LATE_M = (6.5, 12.5)  # before a junction's line, where a late lane change begins
 TINY_A_JUNCTION = 5
 
 
@@ -103,8 +104,18 @@ def _cost_of(lanes: Lanes, seen: Counter[int]) -> Callable[[Way], float]:
     return cost
 
 
-def random_way(lanes: Lanes, goal_m: float, dice: random.Random) -> Way | None:
-    """A random drive of a given length that crosses no connector twice; None where it got stuck."""
+def random_way(
+    lanes: Lanes, goal_m: float, dice: random.Random, *, late_changes: float = 0.0
+) -> Way | None:
+    """A random drive of a given length that crosses no connector twice; None where it got stuck.
+
+    Args:
+        lanes: It leads along.
+        goal_m: How long it is to be.
+        dice: Which it is drawn by.
+        late_changes: At which share of the junctions it changes lane just before the line, where
+            there is a lane beside.
+    """
     lane = dice.choice(streets(lanes))
     begin_m = MARGIN_M + dice.random() * 0.5 * float(lanes.length_m[lane])
     path, changes_m, at_m, left_m = [lane], [], begin_m, goal_m
@@ -122,6 +133,15 @@ def random_way(lanes: Lanes, goal_m: float, dice: random.Random) -> Way | None:
         end_m = at_m + left_m
         if end_m <= float(lanes.length_m[lane]) - MARGIN_M:
             return _way(path, begin_m, max(end_m, at_m + MARGIN_M), changes_m)
+        if late_changes and dice.random() < late_changes:
+            change_m = float(lanes.length_m[lane]) - dice.uniform(*LATE_M)
+            options = [beside_it for beside_it in beside(lanes, lane) if beside_it not in path]
+            if options and change_m > at_m + CHANGE_M:
+                target = dice.choice(options)
+                if may_change(lanes, lane, target, change_m):
+                    path.append(target)
+                    changes_m.append(change_m)
+                    left_m, at_m, lane = left_m - (change_m - at_m), change_m, target
         ahead = [
             c for c in connectors_of(lanes, lane) if c not in path and after(lanes, c) not in path
         ]

@@ -21,6 +21,7 @@ from di_envs.town.routing.traces import rows_of, successors_of
 
 MARGIN_M = 6.0  # of keypoints from both ends of a lane
 CHANGE_M = 30.0  # from the keypoint at which a lane change begins to the one that it must reach
+LEAST_CHANGE_M = 5.5  # between these where a lane ends; the planner comes over within 5 m
 OWN_SNAP_M = 0.1  # keypoints of our own lie on lane centres
 
 _CHANGES = (int(RoadOption.CHANGELANELEFT), int(RoadOption.CHANGELANERIGHT))
@@ -90,7 +91,8 @@ def keypoints_of(lanes: Lanes, way: Way) -> tuple[Keypoint, ...]:
         if is_change(lanes, way.lanes[i - 1], lane):
             begin_m = next(changes_m)
             places.append((way.lanes[i - 1], begin_m))
-            places.append((lane, min(begin_m + CHANGE_M, float(lanes.length_m[lane]) - MARGIN_M)))
+            latest_m = max(float(lanes.length_m[lane]) - MARGIN_M, begin_m + LEAST_CHANGE_M)
+            places.append((lane, min(begin_m + CHANGE_M, latest_m)))
         elif lanes.junction[lane] < 0:
             places.append((lane, min(2.0 * MARGIN_M, 0.5 * float(lanes.length_m[lane]))))
     last = (way.lanes[-1], way.end_m)
