@@ -99,9 +99,9 @@ TRAINING_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
     }
 )
 
-# Two towns more. Of the first eyes learn what stands beside and under roads elsewhere: decks, rails,
-# pillars. In the other one planners learn what the routes of CARLA's towns ask for and the seven's
-# do not: to change lane within the last metres before a junction's line, by or behind its queue
+# Two towns more. Of the first eyes learn what stands beside and under roads elsewhere: decks,
+# rails, pillars. In the other planners learn what routes of CARLA's Town05 ask for and those of the
+# seven do not: to change lane within the last metres before a junction's line, beside its queue
 MADE_TOWNS: Mapping[str, TownStyle] = MappingProxyType(
     {
         **TRAINING_TOWNS,

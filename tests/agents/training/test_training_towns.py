@@ -20,10 +20,13 @@ from agents.training.towns import (
     training_town,
 )
 from di_envs.numerics.kernels import kernel_cache
+from di_envs.route_env import RouteEnv
 from di_envs.suites import load_suite
 from di_envs.town.lanes import SignalKind
 from di_envs.town.loading import load_town
+from di_envs.town.plan import RoadOption
 
+CHANGES = (RoadOption.CHANGELANELEFT, RoadOption.CHANGELANERIGHT)
 MADE_TOWNS = [name for name in KNOWN_TOWNS if name not in SHIPPED_TOWNS]
 
 
@@ -55,6 +58,26 @@ def test_one_town_leads_over_viaducts_and_no_other_leaves_the_plane():
     assert 0.2 < (heights > 2.0).mean() < 0.5
     inside = town.lanes.junction[town.lanes.point_lane] >= 0
     assert not heights[inside].any()  # every viaduct is down before its junction
+
+
+def test_routes_of_one_town_change_lane_within_the_last_metres_before_a_junction():
+    late_m = changes_before_a_junction_m("late_changes")
+    near = late_m[late_m < 13.0]
+    assert len(near) >= 40
+    assert near.min() > 7.0  # those of CARLA's Town05 Long begin 7 to 12 m before it
+    for name in TRAINING_TOWNS:
+        assert changes_before_a_junction_m(name).min(initial=np.inf) > 25.0, name
+
+
+def changes_before_a_junction_m(name):
+    """How far before its junction's line each lane change of a town's first routes begins [m]."""
+    env = RouteEnv(**town_files(name).options(), observations=("prompt",))
+    found = []
+    for plan in env.plans:
+        changes = np.isin(plan.option, CHANGES)
+        begins = np.flatnonzero(changes & ~np.append(False, changes[:-1]))
+        found.append(env.course.junction_m[plan.route_id][begins])
+    return np.concatenate(found)
 
 
 def ends_of(lanes):
