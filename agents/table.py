@@ -98,7 +98,7 @@ AGENTS: dict[str, AgentEntry] = {
     "driveinsight": _policy(
         "driveinsight",
         "the paper's policy: cameras, LiDAR and prompt to waypoints",
-        version=3,
+        version=4,
     ),
     "driveinsight-told": _policy(
         "driveinsight-told",
