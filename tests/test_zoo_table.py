@@ -95,7 +95,7 @@ def test_a_success_is_a_whole_route_without_a_scored_infraction():
 def test_samples_seen_are_of_all_stages_whose_weights_it_begins_with():
     pictures, planned = samples_seen("driveinsight")
     assert pictures == (5_000 + 2_000) * 5 * 4, "two stages of eyes, sequences of four moments"
-    assert planned == (8_000 + 4 * 5_000 + 8_000) * 128, "fresh, four rounds of corrections, last"
+    assert planned == (8_000 + 4 * 5_000 + 2 * 8_000) * 128, "fresh, four rounds, joined, last"
     assert samples_seen("mile") == (3_750 * 16, 0)
     assert samples_seen("driveadapter") == (2 * 3_750 * 16, 0), "its teacher's, too"
     assert samples_seen("ppo") is None, "it learns from reward"
