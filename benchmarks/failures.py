@@ -60,13 +60,13 @@ def failures_of(run: RunRecord) -> Mapping[str, Sequence[Failure]]:
     return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
 
-def moments(run: RunRecord, failure: Failure) -> Iterator[Any]:
-    """The streets around the ego just before an infraction."""
+def moments(run: RunRecord, record: RouteRecord, times_s: Sequence[float]) -> Iterator[Any]:
+    """The streets around the ego at moments of a recorded route, in their order."""
     env = replay_env(run)
     renderer = Renderer(load_course(env.config.changes()))
-    wanted = [max(failure.time_s - before, 0.0) for before in BEFORE_S]
+    wanted = list(times_s)
     edge = (MAP_PX - PANEL_PX) // 2
-    for step in replay(run, failure.record, env=env):
+    for step in replay(run, record, env=env):
         if wanted and step.time_s >= wanted[0] - 1e-6:
             wanted.pop(0)
             yield renderer.map(step.view).crop((edge, edge, edge + PANEL_PX, edge + PANEL_PX))
@@ -82,7 +82,8 @@ def draw(run: RunRecord, kinds: Mapping[str, Sequence[Failure]]) -> Any:
         title = f"{first.words}: route {first.record.route_id}, {first.time_s:.1f} s; "
         shown = ", ".join(f"{before:g} s before" if before else "then" for before in BEFORE_S)
         pen.text((GAP_PX, row * height + 4), title + shown, "#1d2126", font)
-        for column, image in enumerate(moments(run, first)):
+        times_s = [max(first.time_s - before, 0.0) for before in BEFORE_S]
+        for column, image in enumerate(moments(run, first.record, times_s)):
             picture.paste(image, (column * (PANEL_PX + GAP_PX), row * height + TITLE_PX))
     return picture
 
